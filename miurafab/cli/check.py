@@ -39,6 +39,8 @@ def check(
     to a crease, tab fold, outline, hole or label of the pattern. Exits with 1 if something does not
     hold.
     """
+    from miurafab.cli.pattern_report import show_pattern
+
     if thing.is_dir():
         return _check_job(thing, rebuild, console)
     if rebuild:
@@ -47,8 +49,7 @@ def check(
     report = result.report()
 
     def show() -> None:
-        hidden = {"findings", "advice", "iterations", "proved"}
-        console.facts({key: value for key, value in report.items() if key not in hidden})
+        show_pattern(console, report, opened=True)
         for sentence in result.proved:
             console.line(f"Proved: {sentence}")
         console.findings(result.findings)

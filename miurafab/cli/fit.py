@@ -67,6 +67,8 @@ def fit(
     nearest sheet is written to NAME.rejected.fold. Ctrl-C ends the search: the best sheet up to
     then is written. With --size bed the shell is as large as the sheets of the machine allow.
     """
+    from miurafab.cli.pattern_report import show_pattern
+
     if out.suffix.lower() != ".fold":
         raise OptionError("out", f"is {out}; a fit writes a FOLD file, whose name ends in .fold")
     new_file(out, "The pattern file", (".fold",))
@@ -87,9 +89,7 @@ def fit(
         answer["file"] = str(file)
     if report is not None:
         write_text(report, json_text(answer) + "\n")
-    hidden = ("attempts", "findings")
-    shown = {key: value for key, value in answer.items() if key not in hidden and value != ""}
-    console.answer(answer, lambda: console.facts(shown))
+    console.answer(answer, lambda: show_pattern(console, answer))
     for finding in result.findings:
         if finding not in asked.findings and finding.sentence not in result.advice:
             console.note(finding.sentence)

@@ -28,9 +28,9 @@ from miurafab.origami.fitting.result import FitResult
 from miurafab.origami.formats.fold import read_fold
 from miurafab.profiles import MachineProfile, Material, read_machine, read_material
 from miurafab.studio.bed_words import at_once, planned
-from miurafab.studio.report_text import headline, pattern_lines
 from miurafab.surfaces.mesh_files import mesh_suffix
 from miurafab.workflow.design import Design
+from miurafab.workflow.report_text import headline, pattern_lines
 from miurafab.workflow.scaling import ScaleOptions, scaled, size_of
 
 MOST = 400

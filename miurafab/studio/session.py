@@ -22,12 +22,12 @@ from miurafab.studio import recipe
 from miurafab.studio.form import LABELS, by_label
 from miurafab.studio.names import safe_stem, suffix_of
 from miurafab.studio.orders import FitOrder, LayoutOrder
-from miurafab.studio.report_text import headline, layout_lines, pattern_lines
 from miurafab.studio.source import PATTERN_SUFFIX, Source, kind_of, require_stock
 from miurafab.studio.work import Order
 from miurafab.studio.worker import News, Running
 from miurafab.surfaces.height_field import IMAGE_SUFFIXES
 from miurafab.surfaces.mesh_files import MESH_SUFFIXES, PACKED
+from miurafab.workflow.report_text import headline, layout_lines, pattern_lines
 
 _IN_MM = {"min_edge", "max_deviation", "max_distance"}
 """Options that depend on the size of a sheet."""

@@ -31,9 +31,9 @@ from miurafab.studio.glance import Glances
 from miurafab.studio.held_session import HeldSession
 from miurafab.studio.machine_words import box_words
 from miurafab.studio.mends import mends
-from miurafab.studio.report_text import layout_lines
 from miurafab.studio.work import Order, carry_out, failure
 from miurafab.workflow.cut import prepare
+from miurafab.workflow.report_text import layout_lines
 
 LASER, KNIFE = load_machine("grbl-laser-400"), load_machine("grbl-knife-a3")
 CARD = load_material("card-250")

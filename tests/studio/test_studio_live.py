@@ -16,8 +16,8 @@ from miurafab.studio import glance
 from miurafab.studio.bed_words import planned
 from miurafab.studio.glance import MOST, Glances, _stock
 from miurafab.studio.live import Live
-from miurafab.studio.report_text import pattern_lines
 from miurafab.workflow import design as designs
+from miurafab.workflow.report_text import pattern_lines
 
 LAYOUT = {"machine": "grbl-laser-400", "material": "card-250", "options": {}}
 

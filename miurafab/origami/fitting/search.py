@@ -87,18 +87,20 @@ def coarsest(
         tried[longer] = fit(size)
         if tried[longer].status == "interrupted":
             raise KeyboardInterrupt
+        if TIME_RAN_OUT in tried[longer].findings:
+            raise TimeoutError  # what it might have become is not known
         return tried[longer]
 
     try:
         first = _predicted(request, fit, request.timeout)
         best = _search(request, trial, tried, first)
     except KeyboardInterrupt:
-        found = _best_so_far(request, tried, "interrupted", INTERRUPTED)
+        found = _best_so_far(request, tried, INTERRUPTED)
         if found is None:
             raise
-        best = found
+        best = replace(found, status="interrupted")
     except TimeoutError:
-        found = _best_so_far(request, tried, "infeasible", TIME_RAN_OUT)
+        found = _best_so_far(request, tried, TIME_RAN_OUT)
         best = found or next(iter(tried.values()))  # which says that there is none
     if on_progress is not None:
         on_progress(1.0, "done")
@@ -232,21 +234,20 @@ def _hopeless(request: FitRequest, tried: Mapping[int, FitResult], size: int) ->
 
 
 def _best_so_far(
-    request: FitRequest, tried: Mapping[int, FitResult], status: str, why: Finding
+    request: FitRequest, tried: Mapping[int, FitResult], why: Finding
 ) -> FitResult | None:
-    """The result to hand back after Ctrl-C or at the time limit, with ``why`` as its advice; None
-    where no size has a sheet.
+    """The result to hand back after Ctrl-C or at the time limit, with ``why`` as its advice: the
+    coarsest sheet within all limits, else the nearest one; None where no size has a sheet.
     """
-    miss = _miss(request)
     sheets = [tried[n] for n in sorted(tried) if tried[n].pattern is not None]
     if not sheets:
         return None
-    return replace(
-        min(sheets, key=miss),
-        status=status,
-        advice=why.sentence,
-        findings=(why,),
-    )
+    for good in (_holds, _converged):
+        if within := next(filter(good, sheets), None):
+            others = (each for each in within.findings if each != why)
+            return replace(within, advice=why.sentence, findings=(why, *others))
+    nearest = min(sheets, key=_miss(request))
+    return replace(nearest, status="infeasible", advice=why.sentence, findings=(why,))
 
 
 def _shape(request: FitRequest, longer: int) -> tuple[int, int]:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.request import FitRequest
-from miurafab.origami.fitting.result import FitResult
+from miurafab.origami.fitting.result import TIME_RAN_OUT, FitResult
 from miurafab.origami.fitting.score import Score
 from miurafab.origami.fitting.search import COARSEST, FINEST, coarsest
 from miurafab.origami.verify import Measurements
@@ -161,6 +161,47 @@ def test_ctrl_c_and_time_leave_the_nearest_sheet(
     late = coarsest(asked, fit)
     assert late.status == "infeasible"
     assert "`timeout` ended the search" in late.advice
+
+
+def test_a_sheet_within_the_limits_stays_valid_when_time_runs_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fit, fitted = lawful(900.0, 0.0, 3000.0), []
+
+    def kept(asked: FitRequest) -> FitResult:
+        fitted.append(fit(asked))
+        return fitted[-1]
+
+    now = 0.0
+    monkeypatch.setattr("miurafab.origami.fitting.search.time.perf_counter", lambda: now)
+
+    def late(asked: FitRequest) -> FitResult:
+        nonlocal now
+        made = kept(asked)
+        now = 20.0 if made.status == "converged" and len(fitted) > 1 else 0.0
+        return made
+
+    found = coarsest(request(max_deviation_mm=0.5, timeout=10.0), late)
+    assert found.status == fitted[-1].status == "converged"
+    assert found.measurements.facets == fitted[-1].measurements.facets
+    assert "`timeout` ended the search" in found.advice
+
+
+def test_a_fit_that_time_cut_short_says_nothing_of_what_is_possible() -> None:
+    """Edges of 8 mm are far longer than a sheet within 0.001 mm has; but that sheet was not
+    polished, so "No sheet meets all limits" would claim what nobody knows.
+    """
+    fit = lawful(900.0, 0.0, 3000.0)
+
+    def cut_short(asked: FitRequest) -> FitResult:
+        return replace(fit(asked), findings=(TIME_RAN_OUT,))
+
+    asked = request(max_deviation_mm=0.001, min_edge_mm=8.0, timeout=10.0)
+    assert coarsest(asked, fit).advice.startswith("No sheet meets all limits")
+    found = coarsest(asked, cut_short)
+    assert found.status == "infeasible"
+    assert found.advice == TIME_RAN_OUT.sentence
+    assert found.findings == (TIME_RAN_OUT,)
 
 
 def test_ctrl_c_before_there_is_a_sheet_goes_on() -> None:

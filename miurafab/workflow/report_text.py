@@ -1,4 +1,4 @@
-"""The figures of a report as lines of the page, each with what it means.
+"""The figures of a report as lines for a person, each with what it means.
 
 A line has a name, a value, a remark and a mark: ``good``, ``bad``, or none for a matter of taste.
 A residual within rounding is shown as "exact"; the report itself has every digit.
@@ -11,13 +11,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from miurafab.origami.verify import EXACT
+from miurafab.origami.invariants import EXACT
 from miurafab.workflow.dry_run import clock_text, length_text
 
 HEADLINES = {
     "converged": "The sheet fits and folds from flat paper.",
     "infeasible": "The sheet folds, but not within what was asked.",
     "stalled": "No sheet was found.",
+    "interrupted": "The search was interrupted; this is the best sheet up to then.",
     "invalid": "This pattern has faults.",
 }
 
@@ -39,8 +40,11 @@ def headline(status: str, *, opened: bool = False) -> str:
     return HEADLINES.get(status, status)
 
 
-def pattern_lines(report: Mapping[str, Any]) -> list[dict[str, str]]:
-    """The lines of a fit report or of a check; figures that were not measured are left out."""
+def pattern_lines(report: Mapping[str, Any], *, whole: bool = False) -> list[dict[str, str]]:
+    """The lines of a fit report or of a check; figures that were not measured are left out.
+
+    ``whole`` adds what helps to choose between sheets: coverage, angles, shapes and limits.
+    """
     lines = [*_shape(report), *_exactness(report), *_clashes(report)]
     if report.get("min_edge_mm") is not None:
         lines.append(ReportLine("Shortest edge", _mm(report["min_edge_mm"])))
@@ -52,20 +56,48 @@ def pattern_lines(report: Mapping[str, Any]) -> list[dict[str, str]]:
     if (report.get("pieces") or 1) > 1:
         seams = f"{length_text(report['seam_mm'])} of seams"
         lines.append(ReportLine("Pieces", f"{report['pieces']:,}", seams))
+    if whole:
+        lines += _quality(report)
     if report.get("seconds") is not None:
         lines.append(ReportLine("Computed in", f"{report['seconds']:.1f} s"))
     return [asdict(line) for line in lines]
+
+
+def _quality(report: Mapping[str, Any]) -> list[ReportLine]:
+    lines, quality = [], report.get("quality") or {}
+    if report.get("coverage") is not None:
+        lines.append(ReportLine("Covers", f"{100 * report['coverage']:.1f} % of the target"))
+    if quality.get("edge_mm") is not None:
+        lines.append(ReportLine("Median edge", _mm(quality["edge_mm"][1])))
+    if quality.get("sector_angle_deg") is not None:
+        least, most = quality["sector_angle_deg"]
+        lines.append(ReportLine("Sector angles", f"{least:.1f}° to {most:.1f}°"))
+    if quality.get("fold_angle_deg") is not None:
+        median, _, most = quality["fold_angle_deg"]
+        lines.append(ReportLine("Fold angles", f"up to {most:.0f}°", f"median {median:.0f}°"))
+    if quality.get("facet_aspect") is not None:
+        ratio = f"up to {quality['facet_aspect']:.2f} times as long as wide"
+        lines.append(ReportLine("Facet shapes", ratio))
+    if report.get("barrier") is not None:
+        lines.append(ReportLine("Energy barrier", f"{report['barrier']:.3g} k_f L"))
+    if report.get("active_bounds"):
+        bounds = report["active_bounds"].items()
+        held = "; ".join(f"limit of {name}, {count} times" for name, count in bounds)
+        lines.append(ReportLine("Held back by", held))
+    return lines
 
 
 def _shape(report: Mapping[str, Any]) -> list[ReportLine]:
     lines = []
     middle, whole = report.get("hausdorff_midsurface_mm"), report.get("hausdorff_mm")
     if middle is not None:
-        lines.append(ReportLine("Off the target", _mm(middle), "the sheet's middle, at most"))
+        lines.append(ReportLine("Off the target", f"{_mm(middle)} at most", "the sheet's middle"))
     if whole is not None:
         part = report.get("hausdorff_relative")
         of_it = "" if part is None else f", {100 * part:.1f} % of the size"
-        lines.append(ReportLine("With its folds", _mm(whole), f"tips and grooves, at most{of_it}"))
+        lines.append(
+            ReportLine("With its folds", f"{_mm(whole)} at most", f"tips and grooves{of_it}")
+        )
     return lines
 
 
@@ -126,7 +158,7 @@ def layout_lines(totals: Mapping[str, Any]) -> list[dict[str, str]]:
 
 
 def _mm(value: float) -> str:
-    return f"{value:.3g} mm" if value >= 0.01 else "less than 0.01 mm"
+    return f"{value:.3g} mm" if value >= 1e-4 else "less than 0.0001 mm"
 
 
 def _mark(good: bool) -> str:
