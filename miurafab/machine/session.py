@@ -54,7 +54,6 @@ class Session:
         self,
         transport: Transport,
         connection: Connection,
-        transcript: Transcript | None = None,
         check: Callable[[], None] = lambda: None,
     ) -> None:
         self.connection = connection
@@ -72,7 +71,7 @@ class Session:
         self.on_data: Callable[[bytes], None] = lambda data: None
         self.patience = math.inf
         self._transport = transport
-        self.transcript = transcript
+        self.transcript: Transcript | None = None
         self._check = check
         self._asked_at: float | None = None
         self._start = transport.now()

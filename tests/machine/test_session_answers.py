@@ -12,6 +12,7 @@ from session_walk import FRAME, JOB, MACHINE
 from wires import BANNER, FakeWire
 
 from miurafab.errors import ControllerError, JobStopped, MachineError, PortError
+from miurafab.gcode.job import SendLine
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Banner
 from miurafab.grbl.states import State
@@ -20,6 +21,7 @@ from miurafab.machine.journal import read_journal
 from miurafab.machine.known_controller import MachineState, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, owner_of, this_owner
+from miurafab.machine.progress import AS_WRITTEN
 from miurafab.machine.resting_beam import resting_power
 from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
@@ -79,6 +81,78 @@ def greeted(**script: Sequence[bytes]) -> tuple[Session, Scripted]:
     session.connection.receive_data(BANNER)
     list(session.connection.events())
     return session, wire
+
+
+def test_a_session_that_has_heard_nothing_knows_nothing() -> None:
+    wire = Scripted()
+    wire.time = 100.0
+    session = Session(wire, Connection())
+    told = (session.restarted, session.restarted_itself, session.overrides_told, session.heard)
+    assert told == (False, False, False, 0.0)
+    assert session.now() == 0.0
+
+
+def test_a_restart_by_the_port_is_told_once() -> None:
+    session, wire = greeted()
+    session.restarted = wire.blocks = True
+    assert [session.take_restart(), session.take_restart()] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("said", "overrides", "told"),
+    [
+        (b"<Idle|Ov:120,50,90>\r\n", (120, 50, 90), True),
+        (b"<Idle|Ov:120,50>\r\n", AS_WRITTEN, False),
+        (b"<Idle|Ov:120,50,90,1>\r\n", AS_WRITTEN, False),
+        (b"<Idle|Ov:120,50,90>\r\n" + BANNER, AS_WRITTEN, True),
+    ],
+)
+def test_overrides_are_three_numbers_of_a_report_and_end_at_a_start(
+    said: bytes, overrides: tuple[int, ...], told: bool
+) -> None:
+    session = Session(Scripted(late=[(0.1, said)]), Connection())
+    session.pause(0.2)
+    assert session.overrides == overrides
+    assert session.overrides_told is told
+
+
+def test_a_banner_that_no_reset_asked_for_is_a_start_of_its_own() -> None:
+    wire = Scripted(late=[(0.5, BANNER)])
+    session = Session(wire, Connection())
+    session.pause(1.0)
+    assert (session.starts, session.restarted_itself) == (1, True)
+
+
+def test_a_query_that_is_lost_is_asked_again_after_a_second() -> None:
+    session, wire = greeted(query=[b"", b"", DARK])
+    assert session.wait_status().beam_off
+    assert [when for when, _ in wire.sent] == pytest.approx([0.0, 1.0, 2.0], abs=0.11)
+
+
+def test_a_report_that_was_asked_for_before_answers_no_question_of_now() -> None:
+    session, wire = greeted(late=[(0.1, LIT)], query=[b"", DARK])
+    assert session.ask_status()
+    assert session.wait_status().beam_off
+    assert wire.sent.count((0.0, b"?")) == 1
+    assert len(wire.sent) == 2
+
+
+def test_a_controller_that_is_deaf_while_it_stores_is_asked_nothing() -> None:
+    session, wire = greeted()
+    session.write(session.connection.send_line(SendLine(1, b"G10L2P1X1")))
+    assert session.ask_status() is False
+    assert session.fresh_status(1.0) is None
+    assert wire.sent == [(0.0, b"G10L2P1X1\n")]
+
+
+def test_what_was_told_in_inches_is_mm_and_back() -> None:
+    session, wire = greeted()
+    wire._said = b"<Idle|MPos:3.000,2.000,0.000|WCO:1.000,0.000,0.000>\r\n"
+    for inches, unit in ((0, 1.0), (1, 25.4), (1, 25.4), (0, 1.0)):
+        wire._said += f"$13={inches}\r\n".encode()
+        session.pause(0.01)
+        assert session.machine_position == pytest.approx((3 * unit, 2 * unit, 0))
+        assert session.work_offset == pytest.approx((unit, 0, 0))
 
 
 # Stopping
@@ -214,7 +288,7 @@ def test_homing_makes_a_position_known_again_and_asks_where_the_head_is() -> Non
     session.restarted_itself = True
     heeded: list[float] = []
     session.home(lambda: heeded.append(wire.time))
-    assert not session.restarted_itself
+    assert session.restarted_itself is False
     assert heeded
     assert wire.sent == [(wire.sent[0][0], b"$H\n"), (wire.sent[1][0], b"?")]
     session, wire = greeted(**{"$H": [b"ALARM:9\r\n"], "query": [DARK]})
@@ -228,7 +302,7 @@ def test_each_start_is_counted_and_one_that_nobody_sent_is_told() -> None:
     session, wire = greeted(reset=[BANNER], query=[DARK])
     assert session.stop()
     assert session.starts == 2
-    assert not session.restarted_itself
+    assert session.restarted_itself is False
     wire._said += BANNER
     session.pause(0.2)
     assert session.starts == 3
@@ -246,6 +320,7 @@ def test_each_start_is_counted_and_one_that_nobody_sent_is_told() -> None:
         (["WPos:5.000,6.000,0.000|WCO:1.000,2.000,0.000"], (5, 6, 0), (6, 8, 0)),
         (["WPos:0.000,0.000,0.000|WCO:1.000,2.000,0.000", "WPos:1,1,0"], (1, 1, 0), (2, 3, 0)),
         (["FS:0,0"], None, None),
+        (["WPos:0.000,0.000,0.000|WCO:1.000,2.000,0.000", "FS:0,0"], None, None),
     ],
 )
 def test_a_position_is_told_or_is_the_sum_of_what_is_told(
