@@ -362,7 +362,9 @@ class Session:
 
 
 def _stands(report: StatusReport) -> bool:
-    """Whether the axes stand: not running, and a feed hold has come to its end (``Hold:0``)."""
+    """Whether the axes stand, or no feed hold brings them to rest, as none does in homing; a hold
+    has come to its end in ``Hold:0``.
+    """
     if report.state == "Hold":
         return report.substate == 0
-    return report.state not in ("Run", "Jog", "Home")
+    return report.state not in ("Run", "Jog")

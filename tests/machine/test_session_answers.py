@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from session_walk import FRAME, JOB, MACHINE
+from session_walk import FRAME, HOMING, JOB, MACHINE
 from wires import BANNER, FakeWire
 
 from miurafab.errors import ControllerError, JobStopped, MachineError, PortError
@@ -127,6 +128,12 @@ def test_a_query_that_is_lost_is_asked_again_after_a_second() -> None:
     session, wire = greeted(query=[b"", b"", DARK])
     assert session.wait_status().beam_off
     assert [when for when, _ in wire.sent] == pytest.approx([0.0, 1.0, 2.0], abs=0.11)
+    assert session.ask_status()
+    asked = wire.time
+    wire.time = asked + 0.99
+    assert not session.ask_status()
+    wire.time = asked + 1.0
+    assert session.ask_status()
 
 
 def test_a_report_that_was_asked_for_before_answers_no_question_of_now() -> None:
@@ -135,6 +142,25 @@ def test_a_report_that_was_asked_for_before_answers_no_question_of_now() -> None
     assert session.wait_status().beam_off
     assert wire.sent.count((0.0, b"?")) == 1
     assert len(wire.sent) == 2
+
+
+@pytest.mark.parametrize(
+    "wait",
+    [
+        lambda session: session.pause(0.05),
+        lambda session: session.fresh_status(0.05),
+        lambda session: session.wait_banner(0.05),
+        lambda session: session.command("M8", 0.05),
+    ],
+    ids=["pause", "status", "banner", "answer"],
+)
+def test_a_wait_in_silence_ends_at_its_time(wait: Callable[[Session], object]) -> None:
+    session, wire = greeted()
+    session.pause(5.0)
+    begun = wire.time
+    with suppress(ControllerError):
+        wait(session)
+    assert wire.time - begun == pytest.approx(0.05)
 
 
 def test_a_controller_that_is_deaf_while_it_stores_is_asked_nothing() -> None:
@@ -206,19 +232,23 @@ HELD = b"<Hold:0|MPos:1.000,0.000,0.000|FS:0,0>\r\n"
         ([HELD], (0.0, 0.2)),
         ([HOLDING, HOLDING, HELD], (0.0, 0.5)),
         ([DARK.replace(b"Idle", b"Jog"), DARK], (0.0, 0.5)),
-        ([HOLDING], (0.9, 1.3)),
-        ([b"", b"", DARK], (0.9, 1.3)),
+        ([DARK.replace(b"Idle", b"Run"), DARK], (0.1, 0.5)),
+        ([DARK.replace(b"Idle", b"Home")], (0.0, 0.2)),  # which no hold ends
+        ([HOLDING], (0.99, 1.03)),
+        ([b"", b"", DARK], (0.99, 1.03)),
     ],
 )
 def test_a_hold_is_waited_for_a_second_at_most_and_then_comes_the_reset(
     before: list[bytes], seconds: tuple[float, float]
 ) -> None:
     session, wire = greeted(query=before, reset=[BANNER])
+    session.pause(5.0)
     session.hold_and_stop()
     assert wire.commands.startswith(b"!\x18")
-    assert wire.sent[0][1] == b"!"
+    (begun, first), *_ = wire.sent
+    assert first == b"!"
     at = next(when for when, data in wire.sent if data == b"\x18")
-    assert seconds[0] <= at <= seconds[1]
+    assert seconds[0] <= at - begun <= seconds[1]
     asked = [when for when, data in wire.sent if data == b"?" and when < at]
     assert all(b - a >= 0.1 for a, b in itertools.pairwise(asked))
 
@@ -618,6 +648,28 @@ def test_who_is_said_to_own_a_port_owns_it(monkeypatch: pytest.MonkeyPatch, tmp_
     assert owner_of(wire.name) == told
     session.close()
     assert owner_of(wire.name) is None
+
+
+def test_a_signal_ends_the_homing_before_a_job() -> None:
+    class Untouched:
+        def pressed(self) -> str:
+            return ""
+
+    signals = StopSignals()
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE) | HOMING, baud=115_200))
+    session = MachineSession(wire, signals, PortSetup.of(MACHINE), Untouched())
+    session.unlock()
+    session.jog(x=-100.0)
+
+    def stop(call: int) -> None:
+        if b"$H" in wire.commands:
+            signals.caught = "SIGINT"
+
+    wire.before_call = stop
+    with pytest.raises(JobStopped, match="stopped by"):
+        session.cut(replace(JOB, options=replace(JOB.options, home=True)))
+    begun, reset = (next(t for t, sent in wire.written if d in sent) for d in (b"$H\n", b"\x18"))
+    assert reset - begun < 0.2
 
 
 def test_a_signal_ends_a_session_with_the_reset_first() -> None:
