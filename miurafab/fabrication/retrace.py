@@ -89,12 +89,14 @@ def retraced(
 
 
 def _same_labels(told: tuple[AbsentLabel, ...], own: tuple[AbsentLabel, ...]) -> bool:
-    names, places = (
-        [[(each.patch, each.text) for each in labels] for labels in (told, own)],
-        [[(each.x_mm, each.y_mm, each.height_mm) for each in labels] for labels in (told, own)],
-    )
-    near = names[0] == names[1] and np.allclose(places[0], places[1], rtol=0, atol=NEAR_MM)
-    return bool(near)
+    names = [[(each.patch, each.text) for each in labels] for labels in (told, own)]
+    if names[0] != names[1]:
+        return False
+    places = [
+        [(each.x_mm, each.y_mm, each.height_mm, each.rotation_deg) for each in labels]
+        for labels in (told, own)
+    ]
+    return np.allclose(places[0], places[1], rtol=0, atol=NEAR_MM)
 
 
 def patches_on_sheets(

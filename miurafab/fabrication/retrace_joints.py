@@ -120,9 +120,12 @@ def _lock_faults(slot: shapely.Polygon, tab: shapely.Polygon, label: str) -> Ite
     corners = shapely.get_coordinates(slot)[:4]
     along, across = corners[1] - corners[0], corners[3] - corners[0]
     length = float(np.linalg.norm(along))
-    far = 1e3 * np.stack([-along, along, along + across, across - along]) + corners[2]
+    # What is wider than the slot counts, too: the strip between its long sides, and all behind it.
+    aside = 1e3 * np.stack([-along, along, along, -along])
+    far = aside + corners[2] + 1e3 * np.stack([0 * across, 0 * across, across, across])
     neck, head = (
-        _width(tab.intersection(part), along / length) for part in (slot, shapely.Polygon(far))
+        _width(tab.intersection(shapely.Polygon(part)), along / length)
+        for part in (corners + aside, far)
     )
     if not neck <= length + NEAR_MM < head:
         yield f"Tab {label} does not lock: {neck:.2f}, {length:.2f} and {head:.2f} mm wide."

@@ -283,6 +283,12 @@ def test_a_window_of_a_file_without_facets_stays_open_and_is_cut_out(tmp_path):
     found = mf.check_job(tmp_path / "job")
     assert found.traced["outline"] == 2
     assert [each.code for each in found.findings if each.severity == "refusal"] == []
+    layout = json.loads((tmp_path / "job" / "layout.json").read_text())
+    layout["patches"][0]["waste_mm"][0][0][0] += 1.0
+    edited(tmp_path / "job", "layout.json", lambda _: json.dumps(layout))
+    assert sentences(tmp_path / "job", "layout") == [
+        f"The outline of {patch.label} does not surround its facets and tabs."
+    ]
 
 
 def test_what_is_not_proven_is_said(tmp_path):

@@ -104,6 +104,16 @@ def test_each_kind_of_stroke_is_told_by_its_operation_edge_and_rank() -> None:
         assert traced == Counter(dict.fromkeys(kinds, 1)) - Counter([kind])
 
 
+def test_the_edge_of_number_0_is_one_as_any_other() -> None:
+    assert PATTERN.edges_assignment[0] == "B"
+    tick, slit = ("engrave", [(10.0, 10.0), (12.0, 10.0)], 0, 0), dash(20, edge=0)
+    text = burnt("engrave", tick[1])
+    assert found([tick], text) == ([], {"tick": 1})
+    says, traced = found([tick, slit], text)
+    assert says == ["the slit on edge 0 from X20.000 Y10.000 is not burnt."]
+    assert traced == {"tick": 1}
+
+
 def test_a_stroke_may_be_burnt_either_way_and_its_operation_need_not_be_said() -> None:
     strokes = [dash(10), dash(20)]
     way = [strokes[0][1], strokes[1][1][::-1]]

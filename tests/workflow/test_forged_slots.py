@@ -1,0 +1,139 @@
+"""A tab that is changed together with its slot, so that they fit each other: what the joint is
+judged by then is whether it holds."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from test_forged_jobs import Document, forged, made, narrow, refused, tab
+
+import miurafab as mf
+from miurafab.fabrication.labels import AbsentLabel
+from miurafab.fabrication.layout import read_layout
+from miurafab.fabrication.nesting import turned
+from miurafab.fabrication.retrace import _same_labels, patches_on_sheets
+from miurafab.fabrication.retrace_joints import NEAR_MM, _lock_faults, held
+from miurafab.profiles import load_material
+
+
+def slots_follow(document: Document, folder: Path) -> None:
+    """Put each slot of ``document`` where its tab goes through the facet of its mate."""
+    pattern = mf.load(folder / "sheet.fold")
+    layout = read_layout(json.dumps(document), folder / "layout.json")
+    outlined, labels, _ = patches_on_sheets(layout, pattern)
+    found = held(outlined, pattern, load_material("card-250"), labels, "slots").slots
+    own = {each["label"]: (patch, each) for patch in document["patches"] for each in patch["slots"]}
+    for row, corners in zip(found.tab.tolist(), found.corners, strict=True):
+        patch, slot = own[labels[row]]
+        moved = turned(corners - patch["origin_mm"], patch["rotation_deg"])
+        slot["polygon_mm"] = moved.tolist()
+
+
+def said(to: Path, change: Any) -> list[str]:
+    def both(document: Document) -> None:
+        change(document)
+        slots_follow(document, made("slots"))
+
+    found = refused(forged("slots", to, both))
+    return [each.removeprefix("layout: ") for each in found if each.startswith("layout: ")]
+
+
+P1 = "The outline of P1 does not surround its facets and tabs."
+P2 = "The outline of P2 does not surround its facets and tabs."
+
+
+def along(document: Document, by: float) -> None:
+    part = tab(document)
+    part["polygon_mm"] = [[x, y + by] for x, y in part["polygon_mm"]]
+
+
+def test_slots_that_follow_their_tabs_are_those_of_the_layout(tmp_path: Path) -> None:
+    assert said(tmp_path, lambda document: None) == []
+
+
+def test_a_head_that_is_no_wider_than_its_slot_does_not_lock(tmp_path: Path) -> None:
+    locks, *others = said(tmp_path, lambda document: narrow(tab(document)))
+    assert locks.startswith("Tab a1 does not lock: 5.")
+    neck, length, head = map(float, re.findall(r"\d+\.\d\d", locks))
+    assert neck <= length
+    assert head <= length
+    assert set(others) <= {P1, P2}
+
+
+def test_a_slot_keeps_clear_of_the_sides_of_its_facet(tmp_path: Path) -> None:
+    found = said(tmp_path, lambda document: along(document, 1.5))
+    assert found[0] == "The slot for tab a1 lies within 1 mm of a side of its facet."
+
+
+def arrow(neck: float, head: float) -> shapely.Polygon:
+    """A tab through :data:`SLOT` upwards: ``neck`` mm wide in it and ``head`` mm behind it."""
+    return shapely.union(
+        shapely.box(5 - neck / 2, -3.0, 5 + neck / 2, 0.6),
+        shapely.box(5 - head / 2, 0.6, 5 + head / 2, 4.0),
+    )
+
+
+@pytest.mark.parametrize(
+    ("neck", "head", "locks"),
+    [
+        (9.8, 11.0, True),
+        (10.0, 11.0, True),
+        (10.0 + 0.9 * NEAR_MM, 11.0, True),
+        (10.0 + 1.1 * NEAR_MM, 11.0, False),
+        (9.8, 10.0, False),
+        (9.8, 10.0 + 0.9 * NEAR_MM, False),
+        (9.8, 10.0 + 1.1 * NEAR_MM, True),
+        (9.8, 9.8, False),
+    ],
+)
+@pytest.mark.parametrize("turn", [0.0, 90.0, 33.0])
+def test_a_neck_fits_its_slot_and_a_head_is_wider(
+    neck: float, head: float, locks: bool, turn: float
+) -> None:
+    def placed(shape: shapely.Polygon) -> shapely.Polygon:
+        return shapely.transform(shape, lambda points: turned(points, turn) + np.array([40.0, 7.0]))
+
+    # The corners of a slot begin at its front: along it, then away from the seam.
+    slot = placed(shapely.Polygon([(0, 0), (10, 0), (10, 0.5), (0, 0.5)]))
+    found = list(_lock_faults(slot, placed(arrow(neck, head)), "a1"))
+    assert found == (
+        [] if locks else [f"Tab a1 does not lock: {neck:.2f}, 10.00 and {head:.2f} mm wide."]
+    )
+
+
+def test_a_tab_that_ends_in_its_slot_has_no_head() -> None:
+    slot = shapely.Polygon([(0, 0), (10, 0), (10, 0.5), (0, 0.5)])
+    assert list(_lock_faults(slot, shapely.box(1.0, -3.0, 9.0, 0.4), "b2")) == [
+        "Tab b2 does not lock: 8.00, 10.00 and 0.00 mm wide."
+    ]
+
+
+def absent(**changes: Any) -> AbsentLabel:
+    label = AbsentLabel(patch=1, text="a1", x_mm=3.0, y_mm=4.0, rotation_deg=0.0, height_mm=2.0)
+    return replace(label, **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "same"),
+    [
+        ({}, True),
+        ({"x_mm": 3.0 + 0.9 * NEAR_MM}, True),
+        ({"x_mm": 3.0 + 1.1 * NEAR_MM}, False),
+        ({"y_mm": 4.0 - 1.1 * NEAR_MM}, False),
+        ({"height_mm": 2.1}, False),
+        ({"rotation_deg": 90.0}, False),
+        ({"patch": 0}, False),
+        ({"text": "a2"}, False),
+    ],
+)
+def test_an_absent_label_is_told_by_its_place_and_text(changes: Any, same: bool) -> None:
+    assert _same_labels((absent(**changes),), (absent(),)) is same
+    assert _same_labels((absent(), absent(**changes)), (absent(), absent())) is same
+    assert not _same_labels((absent(),), ())
