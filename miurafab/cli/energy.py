@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import miurafab
-from miurafab.cli.console import Console
+from miurafab.cli.console import Console, readable
 from miurafab.cli.declared import argument, option, takes
 from miurafab.errors import DONE, NO
 from miurafab.files import new_file
@@ -22,6 +22,26 @@ EXAMPLES = (
     "miurafab energy hypar.fold --material card-250 -o energy.csv",
     "miurafab energy hypar.fold --pull corners --strain 0.2 -o pull.html",
 )
+
+
+_OF_CYCLES = {
+    "cycle": "cycle",
+    "strain": "strain",
+    "force_n": "force (N)",
+    "set_mm": "longer by (mm)",
+    "work_j": "work (J)",
+    "dissipated_j": "dissipated (J)",
+}
+_OF_PIECES = {
+    "piece": "piece",
+    "facets": "facets",
+    "rigid": "rigid",
+    "bistable": "bistable",
+    "barrier": "barrier",
+    "barrier_angle_deg": "at (deg)",
+    "energy_unit": "unit",
+    "stiffness": "stiffness (per rad²)",
+}
 
 
 def _own_options() -> type:
@@ -84,19 +104,60 @@ def energy(
 def _show(
     console: Console, curve: EnergyCurve | PieceEnergies | PullCurve, answer: dict[str, Any]
 ) -> None:
-    hidden = ("stable_states", "pieces", "cycles", "curve", "pulled")
-    console.facts({key: answer[key] for key in answer if key not in hidden})
+    console.facts(_pulled(answer) if "cycles" in answer else _unfolded(answer))
     if "cycles" in answer:
-        _rows(console, answer["cycles"], "cycle strain force_n set_mm work_j dissipated_j")
+        _rows(console, answer["cycles"], _OF_CYCLES)
     elif "pieces" in answer:
-        keys = "piece facets rigid bistable barrier barrier_angle_deg stiffness"
-        _rows(console, answer["pieces"], keys)
+        _rows(console, answer["pieces"], _OF_PIECES)
     elif answer["stable_states"]:
         rows = [[state["angle_deg"], state["energy"]] for state in answer["stable_states"]]
         console.rows(("stable at (deg)", f"energy ({answer['energy_unit']})"), rows)
     console.line(curve.verdict())
 
 
-def _rows(console: Console, entries: list[dict[str, Any]], keys: str) -> None:
-    rows = [[entry.get(key, "") for key in keys.split()] for entry in entries]
-    console.rows([key.replace("_", " ") for key in keys.split()], rows)
+def _unfolded(answer: dict[str, Any]) -> dict[str, Any]:
+    """The figures of a curve, or of several pieces, with names and units for a person."""
+    facts: dict[str, Any] = {"Converged": answer["converged"]}
+    if "barrier" in answer:
+        unit, at = answer["energy_unit"], answer["barrier_angle_deg"]
+        where = "" if at is None else f" at {at:.1f}°"
+        first, last = answer["folded_angle_deg"], answer["last_angle_deg"]
+        facts |= {
+            "Barrier": f"{readable(answer['barrier'])} {unit}{where}",
+            "Bistable": answer["bistable"],
+            "Energy when flat": f"{readable(answer['flat_energy'])} {unit}",
+            "Highest energy": f"{readable(answer['highest_energy'])} {unit}",
+            "Stiffness": f"{readable(answer['stiffness'])} {unit} per rad²",
+            "Driven crease": f"{answer['crease']}, from {first:.1f}° to {last:.1f}° in "
+            f"{answer['steps']} steps",
+        }
+    facts["Folds rigidly"] = answer["rigid"]
+    return facts | ({"File": answer["file"]} if "file" in answer else {})
+
+
+def _pulled(answer: dict[str, Any]) -> dict[str, Any]:
+    """The figures of a pull with names and units for a person."""
+    one, other = answer["pulled"]
+    facts: dict[str, Any] = {
+        "Converged": answer["converged"],
+        "Pulled": f"vertices {one} and {other}, {answer['distance_mm']:.1f} mm apart, by "
+        f"{100 * answer['strain']:.3g} %",
+        "Force": f"{answer['force_n']:.3g} N, {answer['largest_force_n']:.3g} N at most",
+        "Stays longer by": f"{answer['set_mm']:.3g} mm",
+        "Creases that yield": f"{100 * answer['yielded']:.3g} %",
+        "Material": f"{answer['thickness_mm']:.3g} mm thick, modulus "
+        f"{answer['modulus_pa'] / 1e9:.3g} GPa, crease length {answer['crease_length_mm']:.3g} mm",
+    }
+    if answer["yield_angle_deg"] is not None:
+        facts["Creases yield"] = f"at {answer['yield_angle_deg']:.3g}°, then with "
+        facts["Creases yield"] += f"{100 * answer['hardening']:.3g} % of their stiffness"
+    for name, key in (("Second", "second"), ("Third", "third")):
+        change = answer[f"{key}_cycle_change_n"]
+        if change is not None:
+            facts[f"{name} cycle"] = f"{change:.1e} N off the one before"
+    return facts | ({"File": answer["file"]} if "file" in answer else {})
+
+
+def _rows(console: Console, entries: list[dict[str, Any]], columns: dict[str, str]) -> None:
+    rows = [[entry.get(key, "") for key in columns] for entry in entries]
+    console.rows(list(columns.values()), rows)

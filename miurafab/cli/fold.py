@@ -10,6 +10,7 @@ from miurafab.cli.console import Console
 from miurafab.cli.declared import argument, option, takes
 from miurafab.errors import DONE, NO, InputError, OptionError
 from miurafab.files import new_file
+from miurafab.findings import counted
 from miurafab.options import File, read_options
 
 if TYPE_CHECKING:
@@ -120,24 +121,7 @@ def fold(
 
 def _show(console: Console, folding: Folding, answer: dict[str, Any]) -> None:
     contacts, thick = answer["self_contacts"], answer["thickness"]
-    hidden = {
-        "states",
-        "self_contacts",
-        "layers",
-        "thickness",
-        "certificate",
-        "stretch",
-        "findings",
-    }
-    hidden |= {"wrong_edges", "waiting_edges", "unstable_directions"}
-    facts = {key: value for key, value in answer.items() if key not in hidden and value is not None}
-    if answer.get("waiting_edges"):
-        facts["waiting_edges"] = len(answer["waiting_edges"])
-    facts["self_contacts"] = f"in {len(contacts)} frames" if contacts else "none"
-    if answer["layers"] is not None:
-        facts["overlapping_pairs"] = answer["layers"]["pairs"]
-        facts["layers_known"] = answer["layers"]["known"]
-    console.facts(facts)
+    console.facts(_facts(answer))
     console.findings(folding.findings)
     for run in _runs(contacts):
         console.line(_sentence(run, folding.motion))
@@ -145,6 +129,47 @@ def _show(console: Console, folding: Folding, answer: dict[str, Any]) -> None:
         _show_plates(console, thick)
     elif thick is not None:
         _show_thickness(console, thick)
+
+
+def _facts(answer: dict[str, Any]) -> dict[str, Any]:
+    """The figures of a motion with names and units for a person."""
+    from miurafab.origami.folding.kinematics import CLOSED_FORM
+
+    frames, layers = len(answer["self_contacts"]), answer["layers"]
+    by = "by " if answer["method"] == CLOSED_FORM else ""
+    facts = {
+        "Motion": f"{answer['motion']}, {by}{answer['method']}",
+        "Folds rigidly": "yes" if answer["rigid"] else "no",
+        "Largest strain": f"{answer['max_strain']:.1e} of a side",
+    }
+    if by:
+        facts["Loops close"] = f"within {answer['max_mismatch']:.1e} of the mean edge"
+    if "angle_error_deg" in answer:
+        facts |= {
+            "Fold angles": f"{answer['angle_error_deg']:.1f}° from those asked for, in the mean",
+            "Wrong signs": f"{100 * answer['wrong_signs']:.3g} % of the creases",
+            "Stable": "in every frame" if answer["stable"] else "not in every frame",
+            "Snaps": answer["snaps"],
+            "Contact": "springs keep facets apart" if answer["contact"] else "none to keep apart",
+        }
+        if answer["waiting_edges"]:
+            facts["Wait for others"] = counted(len(answer["waiting_edges"]), "crease", "creases")
+    facts["Frames"] = answer["frames"]
+    if answer["pieces"] > 1:
+        facts["Pieces"] = answer["pieces"]
+    most = answer["piercings"]
+    facts["Passes through itself"] = (
+        f"in {counted(frames, 'frame', 'frames')}, up to "
+        f"{counted(most, 'pair of facets', 'pairs of facets')}"
+        if frames
+        else "never"
+    )
+    if layers is not None:
+        pairs = counted(layers["pairs"], "overlapping pair", "overlapping pairs")
+        known = "in a known order" if layers["known"] else "without a known order"
+        facts["Layers"] = f"{pairs} of facets at the end, {known}"
+    named = (("File", "file"), ("Fold angles in", "csv"), ("Panels in", "panels"))
+    return facts | {name: answer[key] for name, key in named if answer[key] is not None}
 
 
 def _runs(contacts: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:

@@ -56,7 +56,26 @@ def layers(
 
 
 def _show(console: Console, found: Layers, answer: dict[str, Any]) -> None:
-    hidden = ("crossing", "rules", "findings")
-    facts = {key: answer[key] for key in answer if key not in hidden and answer[key] is not None}
-    console.facts(facts)
+    console.facts(_facts(answer))
     console.findings(found.findings)
+
+
+def _facts(answer: dict[str, Any]) -> dict[str, Any]:
+    """The figures of an order with names for a person."""
+    facts: dict[str, Any] = {
+        "Layers have an order": "yes" if answer["exists"] else "no",
+        "Found by": answer["method"],
+    }
+    if answer["orders"] is not None:
+        more = "all there are" if answer["complete"] else "there may be more"
+        facts["Orders"] = f"{answer['orders']:,} ({more})"
+    if answer["agrees"] is not None:
+        facts["Closed form agrees"] = "yes" if answer["agrees"] else "no"
+    if "pairs" in answer:
+        facts["Overlapping pairs"] = answer["pairs"]
+        facts["Undecided pairs"] = answer["undecided"]
+        facts["Levels"] = answer["levels"]
+        facts["Folded flat"] = f"to {answer['flat_mismatch']:.1e} of the mean edge"
+    if answer.get("file"):
+        facts["File"] = answer["file"]
+    return facts

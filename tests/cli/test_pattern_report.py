@@ -1,8 +1,12 @@
-"""What `fit` and `check` print for a person says what their JSON says."""
+"""What commands print of a pattern for a person says what their JSON says."""
 
 import json
 import math
 import re
+
+import named_patterns
+
+from miurafab.origami.formats.fold import write_fold
 
 LIMITS = ("--facets", "4x4", "--size", "150mm", "--max-aspect", "1.5")
 
@@ -80,3 +84,48 @@ def test_a_pattern_with_faults_says_so_and_each_fault_once(run, tmp_path):
     assert checked.returncode == 1
     assert checked.stdout.startswith("This pattern has faults.\n")
     assert checked.stdout.count("join the same two vertices") == 1
+
+
+def _both(run, *words):
+    """The rows for a person, and the JSON, of one command."""
+    return _rows(run(*words).stdout), json.loads(run(*words, "--json").stdout)
+
+
+def test_a_motion_is_told_with_names_and_units(run, tmp_path):
+    write_fold(named_patterns.waterbomb_base(), tmp_path / "flat.fold", "flat")
+    rows, report = _both(run, "fold", "flat.fold", "--steps", "6")
+    assert rows == {
+        "Motion": f"{report['motion']}, from flat",
+        "Folds rigidly": "yes",
+        "Largest strain": f"{report['max_strain']:.1e} of a side",
+        "Fold angles": f"{report['angle_error_deg']:.1f}° from those asked for, in the mean",
+        "Wrong signs": "0 % of the creases",
+        "Stable": "in every frame",
+        "Snaps": "0",
+        "Contact": "none to keep apart",
+        "Frames": "7",
+        "Passes through itself": "never",
+    }
+    assert report["rigid"] is True
+
+
+def test_energy_and_force_are_told_with_their_units(run, tmp_path):
+    made = ("plane", "--facets", "4x4", "--size", "60mm", "--flat-foldable", "exact")
+    assert run("fit", *made, "-o", "p.fold").returncode == 0
+    rows, report = _both(run, "energy", "p.fold", "--steps", "3", "--material", "card-250")
+    assert rows["Stiffness"].endswith(" J per rad²")
+    assert rows["Driven crease"] == (
+        f"{report['crease']}, from {report['folded_angle_deg']:.1f}° to "
+        f"{report['last_angle_deg']:.1f}° in {report['steps']} steps"
+    )
+    assert rows["Folds rigidly"] == "yes"
+    rows, report = _both(run, "energy", "p.fold", "--pull", "corners", "--steps", "3")
+    one, other = report["pulled"]
+    apart = f"{report['distance_mm']:.1f} mm apart, by {100 * report['strain']:.3g} %"
+    assert rows["Pulled"] == f"vertices {one} and {other}, {apart}"
+    assert rows["Force"].startswith(f"{report['force_n']:.3g} N, ")
+    assert rows["Material"].startswith(f"{report['thickness_mm']:.3g} mm thick, modulus ")
+    layers, order = _both(run, "layers", "p.fold")
+    assert layers["Layers have an order"] == "yes"
+    assert layers["Overlapping pairs"] == str(order["pairs"])
+    assert layers["Folded flat"] == f"to {order['flat_mismatch']:.1e} of the mean edge"
