@@ -254,7 +254,14 @@ def test_an_outline_without_its_overcut_is_named(tmp_path):
     last = max(n for n, line in enumerate(lines) if line.startswith("G1"))
     short = "".join(lines[: last - 1] + lines[last + 1 :])  # the outline comes last
     edited(job, "sheet-01.nc", lambda _: short)
-    assert any("overcut of 0.5 mm" in each for each in sentences(job, "stroke"))
+    left = short.splitlines()
+    travel = max(n for n, line in enumerate(left[: last - 1]) if line.startswith("G0"))
+    first = next(n for n in range(travel, last) if left[n].startswith("G1")) + 1
+    assert sentences(job, "stroke") == [
+        f"sheet-01: the stroke at line {first} goes round and not on by the overcut of 0.5 mm."
+    ]
+    (found,) = (each for each in mf.check_job(job).findings if each.code == "stroke")
+    assert found.where == "sheet-01"
 
 
 def test_a_window_of_a_file_without_facets_stays_open_and_is_cut_out(tmp_path):

@@ -121,8 +121,9 @@ def test_a_stroke_may_be_burnt_either_way_and_its_operation_need_not_be_said() -
     assert found(strokes, burnt("", way[0]) + burnt("", way[1]))[0] == []
 
 
-def test_a_stroke_by_another_operation_is_not_the_one_wanted() -> None:
-    says, traced = found([dash(10)], burnt("cut", dash(10)[1]))
+@pytest.mark.parametrize("name", [each for each in OPERATIONS if each != "perforate"])
+def test_a_stroke_by_another_operation_is_not_the_one_wanted(name: str) -> None:
+    says, traced = found([dash(10)], burnt(name, dash(10)[1]))
     assert says == [
         "line 4 burns a stroke from X10.000 Y10.000 that is not of the pattern, or out of its "
         "place.",
