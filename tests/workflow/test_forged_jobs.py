@@ -155,6 +155,12 @@ FORGED: dict[str, tuple[str, Callable[[Document], object], list[str], bool]] = {
         ["Tab a1 does not fit the facet that it is glued to.", P1],
         True,
     ),
+    "tab of three corners": (
+        "glue",
+        lambda d: tab(d).update(polygon_mm=tab(d)["polygon_mm"][:3]),
+        [P1],
+        True,
+    ),
     "tab left out": (
         "glue",
         lambda d: d["patches"][0]["tabs"].pop(0),

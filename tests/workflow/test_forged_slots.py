@@ -15,20 +15,31 @@ import shapely
 from test_forged_jobs import Document, forged, made, narrow, refused, tab
 
 import miurafab as mf
+from miurafab.errors import LayoutError
 from miurafab.fabrication.labels import AbsentLabel
 from miurafab.fabrication.layout import read_layout
 from miurafab.fabrication.nesting import turned
+from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.retrace import _same_labels, patches_on_sheets
 from miurafab.fabrication.retrace_joints import NEAR_MM, _lock_faults, held
+from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import load_material
 
+CARD = load_material("card-250")
 
-def slots_follow(document: Document, folder: Path) -> None:
-    """Put each slot of ``document`` where its tab goes through the facet of its mate."""
+
+def outlined_of(document: Document) -> tuple[OutlinedPatches, CreasePattern, tuple[str, ...]]:
+    folder = made("slots")
     pattern = mf.load(folder / "sheet.fold")
     layout = read_layout(json.dumps(document), folder / "layout.json")
     outlined, labels, _ = patches_on_sheets(layout, pattern)
-    found = held(outlined, pattern, load_material("card-250"), labels, "slots").slots
+    return outlined, pattern, labels
+
+
+def slots_follow(document: Document) -> None:
+    """Put each slot of ``document`` where its tab goes through the facet of its mate."""
+    outlined, pattern, labels = outlined_of(document)
+    found = held(outlined, pattern, CARD, labels, "slots").slots
     own = {each["label"]: (patch, each) for patch in document["patches"] for each in patch["slots"]}
     for row, corners in zip(found.tab.tolist(), found.corners, strict=True):
         patch, slot = own[labels[row]]
@@ -39,7 +50,7 @@ def slots_follow(document: Document, folder: Path) -> None:
 def said(to: Path, change: Any) -> list[str]:
     def both(document: Document) -> None:
         change(document)
-        slots_follow(document, made("slots"))
+        slots_follow(document)
 
     found = refused(forged("slots", to, both))
     return [each.removeprefix("layout: ") for each in found if each.startswith("layout: ")]
@@ -65,6 +76,23 @@ def test_a_head_that_is_no_wider_than_its_slot_does_not_lock(tmp_path: Path) -> 
     assert neck <= length
     assert head <= length
     assert set(others) <= {P1, P2}
+
+
+def test_a_tab_into_any_facet_has_six_corners() -> None:
+    """Into the first facet, of number 0, and into the one after it."""
+    document = json.loads((made("slots") / "layout.json").read_text())
+    outlined, pattern, labels = outlined_of(document)
+    for mate, count, wrong in ((0, 4, True), (1, 7, True), (-1, 4, False)):
+        faces, counts = outlined.tabs.seams.faces.copy(), outlined.tabs.count.copy()
+        faces[1, 1], counts[1] = mate, count
+        seams = replace(outlined.tabs.seams, faces=faces)
+        changed = replace(outlined, tabs=replace(outlined.tabs, seams=seams, count=counts))
+        if wrong:
+            with pytest.raises(LayoutError, match="Tab a2 is no tab for a slot: it has not six"):
+                held(changed, pattern, CARD, labels, "slots")
+        else:
+            assert held(changed, pattern, CARD, labels, "slots").slots.tab.tolist() == [0, 2, 3]
+        assert held(changed, pattern, CARD, labels, "glue").slots is None
 
 
 def test_a_slot_keeps_clear_of_the_sides_of_its_facet(tmp_path: Path) -> None:

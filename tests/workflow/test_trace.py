@@ -208,6 +208,20 @@ def test_a_stray_stroke_is_found_however_finely_it_is_cut_up() -> None:
     assert found([dash(10)], burnt("perforate", dash(10)[1]) + burnt("perforate", on))[0]
 
 
+@pytest.mark.parametrize("gap", [0.05, 0.8])
+def test_a_gap_between_two_dashes_that_is_burnt_is_found(gap: float) -> None:
+    """Both of its ends are corners of wanted strokes."""
+    strokes = [dash(10), dash(12 + gap)]
+    text = "".join(burnt("perforate", each[1]) for each in strokes)
+    assert found(strokes, text)[0] == []
+    says, traced = found(strokes, text + burnt("perforate", [(12, 10), (12 + gap, 10)]))
+    assert says == [
+        "line 10 burns a stroke from X12.000 Y10.000 that is not of the pattern, or out of its "
+        "place."
+    ]
+    assert traced == {"crease": 2}
+
+
 def test_each_pass_is_due_at_its_height() -> None:
     operations = CARD.on(LASER).operations
     twice = replace(operations["perforate"], passes=2, z_step_mm=0.5)
