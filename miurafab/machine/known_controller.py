@@ -274,7 +274,7 @@ class KnownController:
         word = "" if status is None else status.state
         if status is not None and status.substate is not None:
             word += f":{status.substate}"
-        if session.connection.state is State.ALARMED:
+        if session.connection.state is State.ALARMED and word != "Sleep":
             word = "Alarm"  # after a hard limit it answers no status query until a reset
         return MachineState(
             port=session.name,

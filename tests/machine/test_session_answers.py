@@ -253,6 +253,17 @@ def test_a_hold_is_waited_for_a_second_at_most_and_then_comes_the_reset(
     assert all(b - a >= 0.1 for a, b in itertools.pairwise(asked))
 
 
+def test_a_hold_before_a_reset_is_recorded(tmp_path: Path) -> None:
+    session, _ = greeted(query=[HELD], reset=[BANNER])
+    session.transcript = Transcript(tmp_path / "t", "a test")
+    session.hold_and_stop()
+    session.transcript.close()
+    lines = (tmp_path / "t").read_text().splitlines()[1:]
+    sent = [line.partition(" > ")[2] for line in lines if " > " in line]
+    assert sent[:3] == ["!", "?", r"\x18"]
+    assert lines[0] == "0.000000 > !"
+
+
 def test_a_slow_board_has_its_whole_patience_to_come_back() -> None:
     session, wire = greeted(late=[(2.0, BANNER)])
     session.write(session.connection.send_realtime(b"\x18"))
@@ -596,6 +607,94 @@ def test_a_key_that_aborts_a_watched_jog(key: str, sent: bytes) -> None:
     session.watch(0.2)
     keys.keys = key
     assert sent_by(wire, lambda: session.watch(0.1)) == sent
+
+
+def test_what_is_ordered_at_once_is_ended_at_the_close() -> None:
+    session, wire = here()
+    session.open()
+    session.realtime(b"!")
+    assert sent_by(wire, session.close) == b"\x18"
+
+
+def test_a_controller_that_sleeps_is_left_asleep() -> None:
+    session, wire = here()
+    session.say("$SLP")
+    assert session.look().state == "Sleep"
+    assert sent_by(wire, session.close) == b""
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        lambda session: session.home(),
+        lambda session: session.jog(x=900.0),
+        lambda session: session.say("G99"),
+    ],
+    ids=["home", "jog", "say"],
+)
+def test_silence_after_a_refusal_is_no_rest(action: Callable[[MachineSession], object]) -> None:
+    session, wire = here(s20=1, s22=1, s24=500, s25=3000)
+    session.unlock()
+    session.home()
+    session.set_origin()
+    write = wire.write
+
+    def deaf(data: bytes) -> None:
+        if b"$H" in data:
+            data = b"$Q\n"
+        write(
+            b""
+            if data == b"?" and wire.commands.endswith((b"$Q\n", b"F1000\n", b"G99\n"))
+            else data
+        )
+
+    wire.write = deaf  # type: ignore[method-assign]
+    with pytest.raises(ControllerError, match="refused"):
+        action(session)
+    assert b"\x18" in wire.bytes_written
+
+
+def test_nothing_is_asked_while_a_line_is_unanswered() -> None:
+    session, wire = here()
+    session.open()
+    connection = session.conversation.connection
+    session.conversation.write(connection.send_line(SendLine(1, b"G4P1")))
+    session.known.may_differ()
+    assert sent_by(wire, lambda: session.watch(0.5)) == b""
+    assert sent_by(wire, session.look) == b""
+    assert sent_by(wire, lambda: session.watch(1.0)) == b"$#\n$G\n"
+
+
+@pytest.mark.parametrize(
+    ("key", "order"), [(" ", b"!"), ("r", b"~"), ("+", b"\x91"), ("c", b"\x85")]
+)
+def test_a_key_acts_while_no_job_runs(key: str, order: bytes) -> None:
+    class Once:
+        keys = ""
+
+        def pressed(self) -> str:
+            keys, self.keys = self.keys, ""
+            return keys
+
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
+    keys = Once()
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
+    session.open()
+    keys.keys = key
+    assert sent_by(wire, lambda: session.watch(0.1)) == order
+
+
+def test_another_arrow_cancels_a_step_and_moves_at_rest() -> None:
+    session, wire = here()
+    session.open()
+    session.nudge(200.0, 0.0)
+    session.watch(0.5)
+    session.nudge(0.0, 10.0)
+    assert wire.commands.endswith(b"\x85")
+    sent = sent_by(wire, lambda: session.watch(2.0))
+    assert sent.startswith(b"$J=G21G91Y10.000F")
+    assert wire.device.position[0] < 200
+    assert wire.device.position[1] == pytest.approx(10.0, abs=0.01)
 
 
 def test_settling_waits_for_a_jog() -> None:
