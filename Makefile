@@ -3,6 +3,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
+# Bytecode is kept: three workers and some hundred children would compile all modules anew.
+export PYTHONDONTWRITEBYTECODE :=
+
 SHELL := bash
 .SHELLFLAGS := -o pipefail -c
 SHOWN := | sed -u -n 's/^Collecting \([^=]*\).*/  \1/p; s/^Installing collected .*/Unpacking them./p'

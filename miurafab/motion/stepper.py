@@ -143,9 +143,12 @@ def steps_taken(move: Move, micro: int) -> tuple[int, ...]:
     Each axis adds its steps to a counter that starts at events/2, and makes a step when the counter
     passes events. So after m micro-steps it made ceil((events/2 + m steps / 8) / events) - 1 steps.
     """
-    whole = 2 * MICRO * move.events
-    return tuple(
-        start
-        + (1 if n >= 0 else -1) * (-(-(MICRO * move.events + 2 * micro * abs(n)) // whole) - 1)
-        for start, n in zip(move.origin, move.steps, strict=True)
-    )
+    half = MICRO * move.events
+    whole = 2 * half
+    position = []
+    for start, n in zip(move.origin, move.steps, strict=True):
+        if n >= 0:
+            position.append(start - (-(half + 2 * micro * n) // whole) - 1)
+        else:
+            position.append(start + (-(half - 2 * micro * n) // whole) + 1)
+    return tuple(position)

@@ -69,7 +69,7 @@ def flags(machine: Machine) -> Routine:
         yield from _flags(machine)
         if machine.abort:
             return
-    if machine.state in _STEPPING:
+    if machine.state in _STEPPING and machine.stepper.room:
         yield from prepare(machine)
 
 

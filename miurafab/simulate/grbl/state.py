@@ -51,6 +51,8 @@ class FirmwareState(Enum):
     DOOR = "Door"
     SLEEP = "Sleep"
 
+    __hash__ = object.__hash__  # of Enum it is a call in Python, thousands of times a second
+
 
 class RealtimeRequest(Enum):
     """A request of an interrupt to the main program."""
@@ -63,6 +65,8 @@ class RealtimeRequest(Enum):
     CANCEL = auto()
     SLEEP = auto()
 
+    __hash__ = object.__hash__
+
 
 class Suspend(Enum):
     """The progress of a hold, a door stop or a cancelled motion."""
@@ -74,6 +78,8 @@ class Suspend(Enum):
     DOOR_AJAR = auto()
     MOTION_CANCEL = auto()
     JOG_CANCEL = auto()
+
+    __hash__ = object.__hash__
 
 
 class StopOverride(Enum):
@@ -340,25 +346,19 @@ class Machine:
 
     def point_now(self) -> tuple[float, float]:
         """The beam position in machine mm, interpolated between motor steps."""
-        progress = self.stepper.progress(self.now)
-        if progress is None:
-            x, y, _ = self.position
-            return self._point((x, y, 0), (0, 0, 0), 0.0)
-        segment = self.stepper.queue[0]
-        move, part = segment.move, 0.0
-        if segment.cycles:
-            part = (self.now - self.stepper.began) / segment.cycles
-        micro = segment.done + segment.ticks * segment.stride * part
-        return self._point(move.origin, move.steps, micro / (8 * move.events))
-
-    def _point(
-        self, origin: tuple[int, ...], steps: tuple[int, ...], part: float
-    ) -> tuple[float, float]:
-        x, y = (
-            (a + n * part) / k if k else 0.0
-            for a, n, k in zip(origin[:2], steps[:2], self.settings.steps_per_mm[:2], strict=True)
-        )
-        return x, y
+        stepper, (per_x, per_y, _) = self.stepper, self.settings.steps_per_mm
+        x: float
+        y: float
+        if stepper.running:
+            segment = stepper.queue[0]
+            move, part = segment.move, 0.0
+            if segment.cycles:
+                part = (self.now - stepper.began) / segment.cycles
+            made = (segment.done + segment.ticks * segment.stride * part) / (8 * move.events)
+            x, y = move.origin[0] + move.steps[0] * made, move.origin[1] + move.steps[1] * made
+        else:
+            x, y = self.position[:2]
+        return x / per_x if per_x else 0.0, y / per_y if per_y else 0.0
 
     def is_in(self, *states: FirmwareState) -> bool:
         """Whether the state is one of ``states`` now; the state may change in every wait."""

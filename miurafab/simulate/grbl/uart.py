@@ -39,6 +39,7 @@ class Uart:
         self._coming: deque[tuple[int, int]] = deque()
         self._rx_free = 0.0
         self._going: deque[tuple[int, int]] = deque()
+        self._lines: deque[int] = deque()
         self._tx_free = 0.0
 
     def receive(self, now: int, data: bytes) -> None:
@@ -88,7 +89,10 @@ class Uart:
         """Print ``data``; returns the time when its last byte is in the transmit ring."""
         for byte in data:
             self._tx_free = max(self._tx_free, now) + self.byte
-            self._going.append((math.ceil(self._tx_free), byte))
+            done = math.ceil(self._tx_free)
+            self._going.append((done, byte))
+            if byte == _NEWLINE:
+                self._lines.append(done)
         return max(now, math.ceil(self._tx_free - self.dialect.tx_bytes * self.byte))
 
     def cut(self, now: int) -> None:
@@ -96,7 +100,8 @@ class Uart:
         room = self.dialect.tx_bytes + 1
         sent = sum(done <= now for done, _ in self._going)
         while len(self._going) > sent + room:
-            self._going.pop()
+            if self._going.pop()[1] == _NEWLINE:
+                self._lines.pop()
         self._tx_free = float(self._going[-1][0]) if self._going else float(now)
 
     def next_departure(self, now: int) -> int | None:
@@ -105,11 +110,11 @@ class Uart:
 
     def next_line(self) -> int | None:
         """The time when the first line that is not taken yet is out."""
-        return next((done for done, byte in self._going if byte == _NEWLINE), None)
+        return self._lines[0] if self._lines else None
 
     def power_cycle(self, now: int) -> None:
         """Switch off and on: all bytes on the way are lost."""
-        for pending in (self.ring, self._coming, self._going, self._kept):
+        for pending in (self.ring, self._coming, self._going, self._lines, self._kept):
             pending.clear()
         self.deaf = False
         self._rx_free = self._tx_free = float(now)
@@ -123,4 +128,6 @@ class Uart:
         out = []
         while self._going and self._going[0][0] <= now:
             out.append(self._going.popleft())
+            if out[-1][1] == _NEWLINE:
+                self._lines.popleft()
         return out
