@@ -4,7 +4,9 @@ judged by then is whether it holds."""
 from __future__ import annotations
 
 import json
+import math
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from problems import regular
+from sealing import seal
 from test_forged_jobs import Document, forged, made, narrow, refused, tab
 
 import miurafab as mf
@@ -93,6 +97,50 @@ def test_a_tab_into_any_facet_has_six_corners() -> None:
         else:
             assert held(changed, pattern, CARD, labels, "slots").slots.tab.tolist() == [0, 2, 3]
         assert held(changed, pattern, CARD, labels, "glue").slots is None
+
+
+def test_a_tab_at_a_fold_that_lets_nothing_in_is_told() -> None:
+    """Facets that are folded by 175 degrees leave no room for a tab between them."""
+    document = json.loads((made("slots") / "layout.json").read_text())
+    outlined, pattern, labels = outlined_of(document)
+    angles = pattern.edges_fold_angle.copy()
+    angles[outlined.tabs.edge[2]] = math.radians(-175)
+    closed = replace(pattern, edges_fold_angle=angles)
+    with pytest.raises(LayoutError, match="Tab a3 cannot be put through a slot in the facet at"):
+        held(outlined, closed, CARD, labels, "slots")
+
+
+@pytest.fixture(scope="module")
+def bordered(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A job of one patch whose border has a tab at each edge."""
+    folder = tmp_path_factory.mktemp("bordered") / "job"
+    mf.sheets(regular(4, 4), border_tabs="all").write(folder)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("by", "says"),
+    [
+        (0.0, []),
+        (5e-5, []),  # rounding
+        (2e-3, ["Tab a4 does not stand on its edge.", "Tab a4 lies over the facet that bears it."]),
+        (-2e-3, ["Tab a4 does not stand on its edge."]),
+    ],
+)
+def test_a_tab_of_the_border_lies_beside_its_facet(
+    bordered: Path, tmp_path: Path, by: float, says: list[str]
+) -> None:
+    job = shutil.copytree(bordered, tmp_path / "job")
+    layout = json.loads((job / "layout.json").read_text())
+    assert tab(layout, 3)["mate_edge"] is None
+    tab(layout, 3)["polygon_mm"] = [[x - by, y] for x, y in tab(layout, 3)["polygon_mm"]]
+    (job / "layout.json").write_text(json.dumps(layout))
+    seal(job)
+    found = mf.check_job(job)
+    said = [each.sentence for each in found.findings if each.code == "layout"]
+    assert [each for each in said if not each.startswith("The outline")] == says
+    if not by:
+        assert found.traced == {"crease": 66, "tab fold": 66, "label": 48, "outline": 1}
 
 
 def test_a_slot_keeps_clear_of_the_sides_of_its_facet(tmp_path: Path) -> None:
