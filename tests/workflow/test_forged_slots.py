@@ -25,7 +25,8 @@ from miurafab.fabrication.layout import read_layout
 from miurafab.fabrication.nesting import turned
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.retrace import _same_labels, patches_on_sheets
-from miurafab.fabrication.retrace_joints import NEAR_MM, _lock_faults, held
+from miurafab.fabrication.retrace_joints import NEAR_MM, _lock_faults, held, joint_faults
+from miurafab.fabrication.slots import CLEAR_MM
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.profiles import load_material
 
@@ -141,6 +142,41 @@ def test_a_tab_of_the_border_lies_beside_its_facet(
     assert [each for each in said if not each.startswith("The outline")] == says
     if not by:
         assert found.traced == {"crease": 66, "tab fold": 66, "label": 48, "outline": 1}
+
+
+@pytest.mark.parametrize("join", ["slots", "double"])
+def test_a_tab_of_the_border_is_glued_whatever_holds_the_seams(join: str, tmp_path: Path) -> None:
+    mf.sheets(regular(4, 4), border_tabs="all", join=join).write(tmp_path)
+    assert refused(mf.check_job(tmp_path)) == []
+    layout = json.loads((tmp_path / "layout.json").read_text())
+    assert {each["join"] for each in layout["patches"][0]["tabs"]} == {"glue"}
+
+
+@pytest.mark.parametrize(
+    ("away", "in_the_way"),
+    [
+        (CLEAR_MM - 2 * NEAR_MM, True),
+        (CLEAR_MM - 0.5 * NEAR_MM, False),
+        (CLEAR_MM + 0.5 * NEAR_MM, False),
+        (0.0, True),
+    ],
+)
+def test_a_slot_keeps_clear_of_other_tabs_on_its_facet(away: float, in_the_way: bool) -> None:
+    """Tab a2 is laid on the facet of tab a1, ``away`` from the long side of its slot."""
+    document = json.loads((made("slots") / "layout.json").read_text())
+    outlined, pattern, labels = outlined_of(document)
+    found = held(outlined, pattern, CARD, labels, "slots")
+    faces, glued = found.tabs.seams.faces.copy(), found.tabs.glued.copy()
+    faces[1, 1] = faces[0, 1]
+    a, _, c, d = found.slots.corners[0]
+    out = (d - a) / np.linalg.norm(d - a)
+    glued[1, :4] = [d + away * out, c + away * out, c + (away + 3) * out, d + (away + 3) * out]
+    glued[1, 4:] = glued[1, 3]
+    seams = replace(found.tabs.seams, faces=faces)
+    laid = replace(found, tabs=replace(found.tabs, seams=seams, glued=glued))
+    layout = read_layout(json.dumps(document), made("slots") / "layout.json")
+    said = list(joint_faults(layout, pattern, laid, labels, "slots"))
+    assert ("The slot for tab a1 lies in the way of tab a2." in said) is in_the_way
 
 
 def test_a_slot_keeps_clear_of_the_sides_of_its_facet(tmp_path: Path) -> None:

@@ -208,6 +208,14 @@ def test_a_stray_stroke_is_found_however_finely_it_is_cut_up() -> None:
     assert found([dash(10)], burnt("perforate", dash(10)[1]) + burnt("perforate", on))[0]
 
 
+def test_a_dot_at_the_end_of_a_wanted_stroke_is_found() -> None:
+    """Nothing but a knife makes a segment of its own there, however short."""
+    dot = burnt("perforate", [(10.0, 10.0), (10.0015, 10.0)])
+    says, traced = found([dash(10)], burnt("perforate", dash(10)[1]) + dot)
+    assert [each.partition(" from ")[0] for each in says] == ["line 7 burns a stroke"]
+    assert traced == {"crease": 1}
+
+
 @pytest.mark.parametrize("gap", [0.05, 0.8])
 def test_a_gap_between_two_dashes_that_is_burnt_is_found(gap: float) -> None:
     """Both of its ends are corners of wanted strokes."""
