@@ -30,6 +30,7 @@ from miurafab.machine.keys import JOG_CANCEL
 from miurafab.machine.known_controller import PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, claim, holder_of, owner_of, this_owner
+from miurafab.machine.resume import Resumption
 from miurafab.machine.signals import StopSignals
 from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.faults import parse_faults
@@ -431,6 +432,8 @@ def test_a_sheet_that_is_burnt_takes_no_second_job() -> None:
     with pytest.raises(PersonNeeded, match=fresh):
         here.cut(JOB)
     assert len(wire.device.beam_log) == burnt
+    rest = replace(JOB, resumption=Resumption(JOB.job, JOB.sha256, 1, 0, 0, 6))
+    assert here.cut(rest).lines == 15  # which goes on where it is
     here.load()
     assert here.cut(JOB).lines == 15
 

@@ -16,13 +16,14 @@ from miurafab.errors import ControllerError, JobStopped, MachineError, PortError
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Banner
+from miurafab.grbl.settings import Settings
 from miurafab.grbl.states import State
 from miurafab.machine.greeting import restarts
 from miurafab.machine.journal import read_journal
 from miurafab.machine.known_controller import MachineState, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, owner_of, this_owner
-from miurafab.machine.progress import AS_WRITTEN
+from miurafab.machine.progress import AS_WRITTEN, Progress
 from miurafab.machine.resting_beam import resting_power
 from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
@@ -590,15 +591,18 @@ def test_an_abort_forgets_the_arrows_that_are_still_held() -> None:
     assert b"$J" not in sent_by(wire, lambda: session.watch(1.0))
 
 
+class Once:
+    """A keyboard whose keys are pressed once."""
+
+    keys = ""
+
+    def pressed(self) -> str:
+        keys, self.keys = self.keys, ""
+        return keys
+
+
 @pytest.mark.parametrize(("key", "sent"), [("q", b"!\x18"), ("\x18", b"\x18")])
 def test_a_key_that_aborts_a_watched_jog(key: str, sent: bytes) -> None:
-    class Once:
-        keys = ""
-
-        def pressed(self) -> str:
-            keys, self.keys = self.keys, ""
-            return keys
-
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
     keys = Once()
     session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
@@ -614,6 +618,16 @@ def test_what_is_ordered_at_once_is_ended_at_the_close() -> None:
     session.open()
     session.realtime(b"!")
     assert sent_by(wire, session.close) == b"\x18"
+
+
+def test_a_step_that_was_just_sent_is_ended_at_the_close() -> None:
+    session, wire = here()
+    session.nudge(50.0, 0.0)
+    assert sent_by(wire, session.close) == b"\x18"
+    session, wire = here()
+    session.nudge(5.0, 0.0)
+    session.watch(2.0)
+    assert sent_by(wire, session.close) == b""
 
 
 def test_a_controller_that_sleeps_is_left_asleep() -> None:
@@ -669,13 +683,6 @@ def test_nothing_is_asked_while_a_line_is_unanswered() -> None:
     ("key", "order"), [(" ", b"!"), ("r", b"~"), ("+", b"\x91"), ("c", b"\x85")]
 )
 def test_a_key_acts_while_no_job_runs(key: str, order: bytes) -> None:
-    class Once:
-        keys = ""
-
-        def pressed(self) -> str:
-            keys, self.keys = self.keys, ""
-            return keys
-
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
     keys = Once()
     session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
@@ -695,6 +702,74 @@ def test_another_arrow_cancels_a_step_and_moves_at_rest() -> None:
     assert sent.startswith(b"$J=G21G91Y10.000F")
     assert wire.device.position[0] < 200
     assert wire.device.position[1] == pytest.approx(10.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        lambda session: session.jog(x=1.0),
+        lambda session: session.nudge(1.0, 0.0),
+        lambda session: session.set_origin(),
+        lambda session: session.go_to_origin(),
+        lambda session: session.command("M8"),
+        lambda session: session.say("M8"),
+    ],
+)
+def test_whatever_is_done_first_greets_the_machine(
+    action: Callable[[MachineSession], object],
+) -> None:
+    session, wire = here()
+    assert sent_by(wire, lambda: action(session)).startswith(b"$I\n$$\n")
+    assert session.known.opened
+
+
+def test_a_session_is_opened_with_a_reset_where_one_is_asked_for() -> None:
+    session, wire = here()
+    session.conversation.pause(0.5)
+    session.open(reset=True)
+    assert wire.commands.startswith(b"\x18")
+
+
+def test_the_state_is_told_once_a_report_and_asked_for_ten_times_a_second() -> None:
+    session, wire = here()
+    states: list[str] = []
+    session.on_state = lambda state: states.append(state.state)
+    session.open()
+
+    def asked(seconds: float) -> int:
+        session.watch(0.2)
+        before, told = wire.bytes_written.count(b"?"), len(states)
+        begun = wire.now()
+        session.watch(seconds)
+        assert wire.now() - begun == pytest.approx(seconds)
+        count = wire.bytes_written.count(b"?") - before
+        assert abs(len(states) - told - count) <= 1
+        return count
+
+    assert 9 <= asked(1.005) <= 11
+    session.nudge(200.0, 0.0)
+    assert 15 <= asked(1.005) <= 20
+    assert set(states) == {"Idle", "Jog"}
+
+
+def test_the_head_goes_to_the_origin_at_a_rate_of_ours_where_none_is_told() -> None:
+    session, wire = here()
+    session.open()
+    assert b"F6000\n" in sent_by(wire, session.go_to_origin)
+    session.known.settings = Settings({})
+    assert b"F3000\n" in sent_by(wire, session.go_to_origin)
+
+
+def test_a_lid_that_is_shut_again_is_the_only_one_that_new_material_resumes() -> None:
+    session, wire = here()
+    session.open()
+    assert sent_by(wire, session.load) == b""
+    wire.device.receive(b"\x84")
+    assert session.look().state == "Door:1"
+    assert sent_by(wire, session.load) == b""
+    assert session.watch(1.0).state == "Door:0"
+    assert sent_by(wire, session.load) == b"~"
+    assert session.state.state == "Idle"
 
 
 def test_settling_waits_for_a_jog() -> None:
@@ -724,7 +799,9 @@ def test_fresh_material_is_told_before_a_word_and_at_rest() -> None:
 
 def test_a_frame_leaves_the_sheet_fresh_and_a_cut_does_not() -> None:
     session, _ = here()
-    session.frame(FRAME)
+    progress: list[Progress] = []
+    session.frame(FRAME, on_progress=progress.append)
+    assert progress[-1].lines_acknowledged == FRAME.lines
     assert session.state.loaded is None
     session.cut(JOB)
     assert session.state.loaded == "rows.nc"
