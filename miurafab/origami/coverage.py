@@ -20,6 +20,7 @@ covered either: a sheet on one turn of a spiral does not cover the next.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -67,8 +68,8 @@ def coverage(pattern: CreasePattern, tiles: Floats) -> Coverage:
     target = Shell.of_triangles(tiles)
     sheet, facet, normals = pressed(pattern, target)
     return Coverage(
-        1 - _share(target, _missed, sheet),
-        _share(sheet, _beyond, target),
+        1 - _share(target, _missed, sheet, float(sheet.longest.min())),
+        _share(sheet, _beyond, target, math.inf),
         _area_of_pieces(pattern, sheet.triangles, facet, normals),
     )
 
@@ -151,19 +152,19 @@ class Shell:
         points = tails[side] + at[:, None] * (heads - tails)[side]
         return tree_of(np.concatenate([points, heads])), float((lengths / count).max())
 
-    def surely_covers(self, parts: Floats) -> Bools:
+    def surely_covers(self, parts: Floats, reach: float) -> Bools:
         """(k,) which of the triangles ``parts`` (k, 3, 3) have no point that is beyond this shell,
-        or farther from it than its shortest triangle is long.
+        or farther from it than ``reach``.
 
-        Let q be the point of the shell nearest to the centre of a part. For each point b of the
+        Let q be a point of the shell near to the centre of a part. For each point b of the
         border, |p - b|^2 - |p - q|^2 is linear in p. So the least of them over all b is concave,
         and over a part it is least at a corner. Where it is positive at the three corners, each
         point of the part has q nearer than the border.
         """
-        feet = np.repeat(self.trees.closest(parts.mean(axis=1))[0], 3, axis=0)
+        feet = np.repeat(self.trees.near(parts.mean(axis=1)), 3, axis=0)
         corners = parts.reshape(-1, 3)
         squared = ((corners - feet) ** 2).sum(axis=1)
-        covered = squared < self.longest.min() ** 2
+        covered = squared < reach**2
         if self.sides.any():
             tree, apart = self.along_border
             beyond = tree.query(corners)[0]
@@ -289,11 +290,13 @@ def _area_of_pieces(
     return float(np.abs(np.bincount(piece, areas)).sum())
 
 
-def _share(shell: Shell, judged: Callable[[Shell, Floats], Bools], other: Shell) -> float:
+def _share(
+    shell: Shell, judged: Callable[[Shell, Floats], Bools], other: Shell, reach: float
+) -> float:
     """The share of the area of ``shell`` whose points are ``judged`` true of ``other``.
 
     The shell is divided into parts of about equal size, smaller at the border, each judged by its
-    centre. What ``other`` surely covers is not judged.
+    centre. What ``other`` surely covers within ``reach`` is not judged.
     """
     triangles = shell.triangles
     rim: Bools = np.asarray(shell.corners.any(axis=1))
@@ -305,7 +308,7 @@ def _share(shell: Shell, judged: Callable[[Shell, Floats], Bools], other: Shell)
         if not large.any():
             break
         asked = np.flatnonzero(large & ~covered)
-        covered[asked] = other.surely_covers(triangles[asked])
+        covered[asked] = other.surely_covers(triangles[asked], reach)
         triangles = np.concatenate([triangles[~large], in_four(triangles[large])])
         areas = np.concatenate([areas[~large], np.tile(areas[large] / 4, 4)])
         rim = np.concatenate([rim[~large], np.tile(rim[large], 4)])

@@ -43,6 +43,9 @@ def assert_nearest(points, triangles):
     gap = np.linalg.norm(nearest - points, axis=1)
     np.testing.assert_allclose(gap, best, rtol=1e-12, atol=1e-12)
     assert (nearest == closest_on_triangle(points, triangles[triangle])).all()
+    near = MeshTrees.of(triangles).near(points)
+    every = np.abs(each - near).max(axis=2).min(axis=0)
+    assert every.max() == 0.0  # each is the nearest point of some triangle
 
 
 @settings(max_examples=60)

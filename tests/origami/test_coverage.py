@@ -101,7 +101,9 @@ def test_what_is_surely_covered_need_not_be_judged(name, columns, monkeypatch):
     known, asked = [], Shell.surely_covers
     monkeypatch.setattr(Shell, "surely_covers", lambda *of: known.append(asked(*of)) or known[-1])
     found = of(pattern, name)
-    monkeypatch.setattr(Shell, "surely_covers", lambda shell, parts: np.zeros(len(parts), bool))
+    monkeypatch.setattr(
+        Shell, "surely_covers", lambda shell, parts, reach: np.zeros(len(parts), bool)
+    )
     assert found == of(pattern, name)
     assert found.overhang > 0 or name == "plane"
     assert np.concatenate(known).mean() > 0.1
@@ -117,8 +119,8 @@ def test_parts_that_are_surely_covered_lie_off_the_border(height):
     middles[:, 2] *= random.random(2000)
     parts = middles[:, None] + random.normal(scale=0.02, size=(2000, 3, 3))
     inside = (np.abs(parts[..., :2] - 0.5) < 0.5).all(axis=(1, 2))
-    sure = shell.surely_covers(parts)
+    sure = shell.surely_covers(parts, 2.0)
     assert not (sure & ~inside).any()
     if height == 0:
         assert sure.sum() > 0.8 * inside.sum()
-    assert not shell.surely_covers(parts + np.array([0, 0, 10])).any()
+    assert not shell.surely_covers(parts + np.array([0, 0, 10]), 2.0).any()
