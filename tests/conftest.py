@@ -10,6 +10,7 @@ import sys
 import pytest
 from command_line import Done
 from hypothesis import HealthCheck, settings
+from running_order import place
 
 from miurafab.__main__ import main
 
@@ -25,6 +26,10 @@ if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_I
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(items):
+    items.sort(key=lambda item: place(item.path))
 
 
 @pytest.fixture(autouse=True, scope="session")

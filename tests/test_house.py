@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from running_order import FIRST, place
 
 ROOT = Path(__file__).parent.parent
 MODULES = sorted((ROOT / "miurafab").rglob("*.py"))
@@ -233,3 +234,18 @@ def test_no_regular_expression_takes_a_time_without_end():
         texts = {text.replace(known, "") for text in texts}
     assert not {text for text in texts if _repeats_within_repeats(regular.parse(text))}
     assert _repeats_within_repeats(regular.parse("(?:[|,][^|<>]*)*"))
+
+
+def test_what_begins_first_is_there(request):
+    """A file that is renamed keeps its place in the order of the run."""
+    assert len(set(FIRST)) == len(FIRST)
+    assert [name for name in FIRST if not (ROOT / "tests" / name).is_file()] == []
+    assert [place(ROOT / "tests" / name) for name in FIRST] == list(range(len(FIRST)))
+    options = request.config.getini("addopts")
+    assert options[options.index("--dist") :][:3] == [
+        "--dist",
+        "loadfile",
+        "--no-loadscope-reorder",
+    ]
+    places = [place(item.path) for item in request.session.items]
+    assert places == sorted(places)
