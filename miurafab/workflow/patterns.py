@@ -21,7 +21,6 @@ from miurafab.origami.formats.two_forms import ROUNDED
 from miurafab.origami.judge_frames import judge_frames
 from miurafab.origami.judge_pattern import gather, judge
 from miurafab.origami.verify import Audit, audit
-from miurafab.surfaces.description import described_surface
 
 _SHAPES = frozenset({"degenerate-edge", "bow-tie", "overlap", "self-intersection"})
 _WISHES = frozenset({"flat-folding", "closure"})
@@ -146,6 +145,8 @@ def check(pattern: PatternLike) -> Audit:
     >>> mf.check(mf.fit("plane", facets=(4, 4)))
     <Audit valid: 16 facets>
     """
+    from miurafab.surfaces.description import described_surface
+
     found = as_pattern(pattern)
     named = os.fspath(pattern) if isinstance(pattern, str | os.PathLike) else "The pattern"
     with Reading(named, "a pattern with a target", PatternError):

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.boxes import meeting_pairs
+from miurafab.geometry.connected import components
 from miurafab.geometry.nearest import tree_of
 from miurafab.origami.formats.crease_lines import CreaseLines
 from miurafab.origami.formats.settled_parts import DrawnSides
@@ -77,7 +76,7 @@ def _refuse_tangle(low: Floats, high: Floats) -> None:
 def _merged(loose: Floats, near: float) -> tuple[Ints, Floats]:
     """The vertex of each loose point, and the vertices: the first point of each that met."""
     pairs = tree_of(loose).query_pairs(near, output_type="ndarray")
-    _, label = connected_components(_graph(pairs, len(loose)), directed=False)
+    label = components(len(loose), *pairs.T)
     _, first, vertex = np.unique(label, return_index=True, return_inverse=True)
     return np.asarray(vertex, dtype=np.int64), loose[first]
 
@@ -91,10 +90,6 @@ def _lies_on(points: Floats, ends: Floats, near: Floats) -> Bools:
         place = np.einsum("nk,nk->n", offset, along) / length
         away = np.abs(_cross(along, offset)) / length
     return np.asarray((away <= near) & (place > near) & (place < length - near))
-
-
-def _graph(pairs: Ints, nodes: int) -> coo_array:
-    return coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(nodes, nodes))
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

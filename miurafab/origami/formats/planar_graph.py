@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.errors import PatternError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import (
     connected_parts,
     edge_lengths,
@@ -213,13 +212,10 @@ def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
     degree = np.bincount(tail, minlength=len(points))
     before = np.where(rank > first[tail], rank - 1, first[tail] + degree[tail] - 1)
     following = order[before][twin]
-    loops = coo_array((np.ones(count), (np.arange(count), following)), shape=(count, count))
-    number, loop = connected_components(loops, directed=False)
+    loop = components(count, np.arange(count), following)
     cross = points[tail, 0] * points[head, 1] - points[tail, 1] * points[head, 0]
-    area = np.bincount(loop, cross, minlength=number) / 2
-    inside = np.flatnonzero(area > 0)
-    start = np.full(number, count, dtype=np.int64)
-    np.minimum.at(start, loop, np.arange(count))
+    inside = np.flatnonzero(np.bincount(loop, cross) > 0)
+    start = np.unique(loop, return_index=True)[1]
     at = start[inside]
     if not len(at):
         return np.empty((0, 3), dtype=np.int64)

@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import edge_lengths
 
 
@@ -47,8 +46,7 @@ class SettledParts:
         """Of the lines ``drawn``; edges below ``short`` may be left where lines were to meet."""
         count = len(drawn.points)
         pairs = np.unique(np.sort(drawn.sides, axis=1), axis=0)
-        graph = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(count, count))
-        part = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+        part = components(count, *pairs.T)
         loose = np.bincount(pairs.ravel(), minlength=count) == 1
         pieces = np.bincount(drawn.line, minlength=len(drawn.ends))[drawn.line]
         tiny = (edge_lengths(drawn.points, drawn.sides) < short) & (pieces > 1)
