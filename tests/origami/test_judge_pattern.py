@@ -10,10 +10,12 @@ import pytest
 from piece_problems import two_pieces
 from problems import regular
 from test_contact import fan, rolled
+from test_crease_pattern import two_squares as unit_squares
 
 from miurafab.findings import Finding, counted, refusals
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.invariants import EXACT
 from miurafab.origami.judge_pattern import gather, judge_quality, proved, unlisted_seams
 from miurafab.origami.quality import Quality
 from miurafab.origami.verify import Measurements, audit, measure
@@ -147,6 +149,15 @@ def test_forms_of_few_digits_are_the_same_within_what_is_left() -> None:
     )
 
 
+def test_what_is_exact_says_nothing_of_what_is_left() -> None:
+    evidence = gather(regular())
+    for residual, says in ((EXACT, "."), (2 * EXACT, " within 2e-10 mean edges or radians.")):
+        off = np.append(evidence.residuals.planarity[1:], residual)
+        rough = replace(evidence, residuals=replace(evidence.residuals, planarity=off))
+        claim = proved(regular(), rough, [])[4]
+        assert claim == f"The 48 facets are flat, and the same in both forms{says}"
+
+
 def test_what_does_not_hold_says_how_much_and_where() -> None:
     pattern = regular()
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
@@ -196,6 +207,16 @@ def test_a_seam_that_gapes_says_how_far() -> None:
         "seam: 8 seams (0, 1, 2, 3, 4, ...) are not closed: the two edges differ by up to "
         f"{1e-6 / mean:.1e} mean edges in length or in place."
     ]
+
+
+def test_a_seam_is_closed_up_to_what_counts_as_exact() -> None:
+    """Edges of 1 mm, of which one end gapes by 0.25 mm."""
+    pattern = unit_squares()
+    apart = pattern.folded_coords.copy()
+    apart[4, 2] = 0.25
+    for rounded, closed in ((0.25, True), (0.2499, False)):
+        gaping = replace(pattern, folded_coords=apart, rounded=rounded)
+        assert ("seam" not in {each.code for each in audit(gaping).findings}) is closed
 
 
 def test_seams_that_are_not_named_are_found() -> None:
