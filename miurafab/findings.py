@@ -129,6 +129,7 @@ RULES = {
     "cannot-fold-flat": Rule("refusal", "mountains and valleys that no order of layers satisfies"),
     "rough-layers": Rule("note", "layers of a drawing whose rounded facets miss each other"),
     "more-layer-orders": Rule("note", "a search that ended before all layer orders were found"),
+    "followed-once": Rule("note", "a sheet too large for a second way where the first is poor"),
     "way-lost": Rule("warning", "a motion that ends before its creases are where they shall be"),
     "wrong-signs": Rule("warning", "creases that end on the other side than their letter tells"),
     "stretched": Rule("note", "a motion that paper can follow only by stretching"),

@@ -82,28 +82,27 @@ def _best(points: Floats, face: list[int]) -> list[list[int]]:
     best = np.full((count, count), np.inf)
     third = np.zeros((count, count), dtype=np.int64)
     for run in range(2, count):
-        for i in range(count - run):
-            j = i + run
-            between = np.arange(i + 1, j)
-            worst = np.minimum(best[i, between], best[between, j])
-            worst = np.minimum(worst, _shapes(corners, i, between, j, normal))
-            third[i, j] = between[np.argmax(worst)]
-            best[i, j] = worst.max()
+        i = np.arange(count - run)[:, None]
+        j, between = i + run, i + np.arange(1, run)
+        worst = np.minimum(best[i, between], best[between, j])
+        worst = np.minimum(worst, _shapes(corners, i, between, j, normal))
+        chosen = worst.argmax(axis=1)[:, None]
+        third[i, j] = np.take_along_axis(between, chosen, axis=1)
+        best[i, j] = np.take_along_axis(worst, chosen, axis=1)
     triangles, runs = [], [(0, count - 1)]
     while runs:
-        i, j = runs.pop()
-        if j - i > 1:
-            k = int(third[i, j])
-            triangles.append([face[i], face[k], face[j]])
-            runs += [(i, k), (k, j)]
+        first, last = runs.pop()
+        if last - first > 1:
+            middle = int(third[first, last])
+            triangles.append([face[first], face[middle], face[last]])
+            runs += [(first, middle), (middle, last)]
     return triangles
 
 
-def _shapes(corners: Floats, i: int, between: Ints, j: int, normal: Floats) -> Floats:
+def _shapes(corners: Floats, i: Ints, between: Ints, j: Ints, normal: Floats) -> Floats:
     """Twice the area over the square of the longest side, of triangles i, ``between``, j."""
-    a, c = corners[i], corners[j]
-    b = corners[between]
+    a, b, c = corners[i], corners[between], corners[j]
     area = vector_product(b - a, c - a) @ normal
-    sides = [((b - a) ** 2).sum(axis=1), ((c - b) ** 2).sum(axis=1)]
-    longest = np.maximum(np.maximum(*sides), ((c - a) ** 2).sum())
+    sides = [((b - a) ** 2).sum(axis=-1), ((c - b) ** 2).sum(axis=-1)]
+    longest = np.maximum(np.maximum(*sides), ((c - a) ** 2).sum(axis=-1))
     return np.asarray(np.where(longest > 0, area / np.where(longest > 0, longest, 1.0), -np.inf))

@@ -31,6 +31,8 @@ TOUCH = 1e-6
 """Facets that overlap by less than this part of the mean side only touch."""
 
 _CHUNK = 30_000
+_MANY = 8
+"""Triangles to a facet, in the mean, from which pairs of triangles are looked for at once."""
 _SIDES = ((0, 1), (1, 2), (2, 0))
 
 
@@ -75,12 +77,14 @@ def meeting_facets(
     ``split`` are the triangles (T, 3) of bent facets, and the facet (T,) of each.
     """
     faces = pattern.faces_vertices
+    triangles, owner = triangulate(faces, pattern.vertices_coords) if split is None else split
+    shapes = _Triangles.of(points, triangles)
+    if len(triangles) > _MANY * len(faces):
+        return _meeting_owners(points, triangles, owner, shapes)
     real = (faces >= 0)[..., None]
     corners = points[faces]
     low = np.where(real, corners, np.inf).min(axis=1)
     high = np.where(real, corners, -np.inf).max(axis=1)
-    triangles, owner = triangulate(faces, pattern.vertices_coords) if split is None else split
-    shapes = _Triangles.of(points, triangles)
     order = np.argsort(owner, kind="stable")
     counts = np.bincount(owner, minlength=len(faces))
     start = run_starts(counts)
@@ -97,6 +101,21 @@ def meeting_facets(
         hit = np.unique(pair[shapes.meet(one, other)])
         meeting.append(np.stack([a[hit], b[hit]], axis=1))
     pairs = np.concatenate(meeting) if meeting else np.empty((0, 2), dtype=np.int64)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+def _meeting_owners(points: Floats, triangles: Ints, owner: Ints, shapes: _Triangles) -> Ints:
+    """:func:`meeting_facets` for facets of many triangles, of which few meet."""
+    corners = points[triangles]
+    one, other = meeting_pairs(corners.min(axis=1), corners.max(axis=1))
+    apart = owner[one] != owner[other]
+    one, other = one[apart], other[apart]
+    hits = [
+        at[shapes.meet(one[at], other[at])]
+        for at in np.array_split(np.arange(len(one)), 1 + len(one) // _CHUNK)
+    ]
+    hit = np.concatenate(hits)
+    pairs = np.stack([owner[one[hit]], owner[other[hit]]], axis=1)
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
 

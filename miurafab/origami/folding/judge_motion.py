@@ -12,7 +12,7 @@ from miurafab.origami.folding.angles_csv import Contact
 from miurafab.origami.folding.certificate import RigidCertificate
 from miurafab.origami.folding.kinematics import FROM_FLAT, RIGID, FoldingMotion
 from miurafab.origami.folding.motion import FoundMotion
-from miurafab.origami.folding.ramp_motion import HELD_BACK, RampVerdict
+from miurafab.origami.folding.ramp_motion import HELD_BACK, RampVerdict, followed_once
 
 STRETCH = 1e-4
 """Paper tears at a few hundredths; below this nobody sees that a side stretches."""
@@ -77,6 +77,8 @@ def _of_ramp(verdict: RampVerdict, last: float) -> Iterator[Finding]:
         yield Finding(
             "way-lost", f"The motion ends at {last:.0%} of the fold angles: beyond, {why}."
         )
+    if verdict.followed_again is not None:
+        yield Finding("followed-once", followed_once(verdict).strip())
     if len(verdict.wrong_edges):
         yield Finding(
             "wrong-signs",

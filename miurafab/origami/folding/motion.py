@@ -38,7 +38,7 @@ from miurafab.origami.folding.kinematics import (
     rigid_motion,
     states_between,
 )
-from miurafab.origami.folding.ramp_motion import MOST_WRONG, RampVerdict, ramp_motion
+from miurafab.origami.folding.ramp_motion import MOST_WRONG, RampVerdict, followed_once, ramp_motion
 
 Progress = Callable[[float, str], None]
 
@@ -47,6 +47,9 @@ SOFTER = 10 * SOFTNESS
 hundredths on the way."""
 FINER = 3
 """The steps to a frame of a way that is gone again, since it was lost."""
+MOST_AGAIN = 60_000
+"""Vertices times steps of a sheet that is followed more than once; another way of a larger one may
+take minutes."""
 LEAST_FRAMES = 2
 """A way of fewer frames shows no motion."""
 
@@ -115,21 +118,27 @@ def _from_flat(
     pattern: CreasePattern, steps: int, mismatch: float | None, on_progress: Progress | None
 ) -> FoundMotion:
     softness = SOFTNESS
-    motion, verdict = _followed(pattern, steps, on_progress)
-    if verdict.is_held_back:
-        soft, its_verdict = ramp_motion(pattern, steps, softness=SOFTER, on_progress=on_progress)
+    most = MOST_AGAIN // len(pattern.vertices_coords)
+    again = steps <= most
+    motion, verdict = _followed(pattern, steps, again, on_progress)
+    if verdict.is_held_back and again:
+        progress = _named(on_progress, "softer paper")
+        soft, its_verdict = ramp_motion(pattern, steps, softness=SOFTER, on_progress=progress)
         if its_verdict.is_better_than(verdict):
             softness, motion, verdict = SOFTER, soft, its_verdict
     # beside a curved crease facets bend, so that what flat ones could not do says nothing
     ruled = is_ruled(pattern)
+    if not again and (verdict.is_held_back or contacts(motion)):
+        verdict = replace(verdict, followed_again=most)
     if _is_sequence(verdict, ruled):
         raise _sequence(verdict)
-    if contacts(motion):
+    if again and contacts(motion):
         # where it ends before its first frame, or the folds go astray, the contacts of the way
         # without it are told
         with suppress(PatternError):
+            progress = _named(on_progress, "with contact")
             apart, its_verdict = ramp_motion(
-                pattern, steps, touching=True, softness=softness, on_progress=on_progress
+                pattern, steps, touching=True, softness=softness, on_progress=progress
             )
             if _waits(its_verdict, ruled) or its_verdict.wrong_signs <= MOST_WRONG:
                 motion, verdict = apart, its_verdict
@@ -142,20 +151,28 @@ def _from_flat(
 
 
 def _followed(
-    pattern: CreasePattern, steps: int, on_progress: Progress | None
+    pattern: CreasePattern, steps: int, again: bool, on_progress: Progress | None
 ) -> tuple[FoldingMotion, RampVerdict]:
-    """The motion from flat. Where it is lost it is gone again in finer steps: the number of frames
-    that are asked for shall not decide whether a pattern folds.
+    """The motion from flat. Where it is lost it is gone ``again`` in finer steps: the number of
+    frames that are asked for shall not decide whether a pattern folds.
     """
+    finely = _named(on_progress, "finer steps")
     try:
         motion, verdict = ramp_motion(pattern, steps, on_progress=on_progress)
     except PatternError:
-        return ramp_motion(pattern, steps, finer=FINER, on_progress=on_progress)
-    if verdict.complete:
+        return ramp_motion(pattern, steps, finer=FINER, on_progress=finely)
+    if verdict.complete or not again:
         return motion, verdict
-    again, its_verdict = ramp_motion(pattern, steps, finer=FINER, on_progress=on_progress)
-    farther = its_verdict.complete or len(again.frames) > len(motion.frames)
-    return (again, its_verdict) if farther else (motion, verdict)
+    fine, its_verdict = ramp_motion(pattern, steps, finer=FINER, on_progress=finely)
+    farther = its_verdict.complete or len(fine.frames) > len(motion.frames)
+    return (fine, its_verdict) if farther else (motion, verdict)
+
+
+def _named(on_progress: Progress | None, way: str) -> Progress | None:
+    """``on_progress`` of a further ``way``, whose steps are counted anew."""
+    if on_progress is None:
+        return None
+    return lambda part, text: on_progress(part, f"{way}, {text}")
 
 
 def _is_sequence(verdict: RampVerdict, ruled: bool) -> bool:
@@ -227,5 +244,5 @@ def _sequence(verdict: RampVerdict) -> PatternError:
         f"The pattern does not fold in one motion: with all creases turning together, {how}. "
         f"{begin}. Either letters are wrong, or its facets have to bend from the start, as in some "
         "twists, or it folds in a sequence, crease after crease, like a crane; fold its steps as "
-        "patterns of their own."
+        "patterns of their own." + followed_once(verdict)
     )

@@ -42,7 +42,8 @@ class RampVerdict:
     ``strain`` (T,) the largest relative change of a side, ``angle_error`` the mean distance from
     the fold angles asked for in the last frame, radians, and ``snaps`` the number of jumps. If
     ``complete`` is False the way was lost before its end. ``touching`` tells whether springs kept
-    facets from passing through each other.
+    facets from passing through each other. A sheet too large to be followed again in finer steps,
+    with softer paper or with contact is followed again in so few steps as ``followed_again``.
     """
 
     wrong_edges: Ints
@@ -56,6 +57,7 @@ class RampVerdict:
     snaps: int
     complete: bool
     touching: bool
+    followed_again: int | None = None
 
     @property
     def is_held_back(self) -> bool:
@@ -68,6 +70,17 @@ class RampVerdict:
         if self.complete and self.wrong_signs <= MOST_WRONG:
             return other.wrong_signs > MOST_WRONG or self.angle_error < other.angle_error
         return False
+
+
+def followed_once(verdict: RampVerdict) -> str:
+    """The sentence on a sheet that was followed once; empty for another."""
+    if verdict.followed_again is None:
+        return ""
+    fewer = f": ask for at most {verdict.followed_again} `steps`" if verdict.followed_again else ""
+    return (
+        " So large a sheet is followed but once, and not again in finer steps, with softer paper "
+        f"or with contact{fewer}."
+    )
 
 
 def ramp_motion(

@@ -61,6 +61,10 @@ SHAKES = 4
 """How often facets that touch are shaken for one snap."""
 MAX_SNAPS = 20
 """A path that has to be shaken more often is lost."""
+LEAST_PATIENCE = 8
+"""How many factorisations a frame gets at least to find its stiff shape: each that finds none
+halves what the next one gets. Curved creases have no stiff shapes, and spent most of their time so.
+"""
 FIRMER = 100.0
 """The factor on the stiffness of facets in a frame."""
 HALF_WAY = 0.1
@@ -103,6 +107,7 @@ class RampWalk:
         self._known: list[Known] = []
         self._factored: Factored | None = None
         self._step = FIRST
+        self._patience = MAX_ITERATIONS
         self.snaps = 0
         self._near = near
         self._pairs = NO_PAIRS
@@ -145,7 +150,10 @@ class RampWalk:
         """The last state with stiff bars, if they find a stable balance near it, or as it is."""
         here = self._known[-1]
         self._stiff.last[:] = self._soft.last
-        found = self._solved(self._stiff, here.state, here.drive)
+        found = self._solved(self._stiff, here.state, here.drive, factors=self._patience)
+        self._patience = (
+            MAX_ITERATIONS if found.converged else max(LEAST_PATIENCE, self._patience // 2)
+        )
         if self._near is not None and not found.converged:
             self._half.last[:] = self._soft.last
             self._arm(here.state.points, REACH)
@@ -295,10 +303,11 @@ class RampWalk:
         guess: EquilibriumState,
         part: float,
         factored: Factored | None = None,
+        factors: int = MAX_ITERATIONS,
     ) -> Solution:
         """The balance near ``guess``; pairs that come to touch get their springs on the way."""
         definite = self._near is not None and balance is self._soft
-        factors = MOST_FACTORS if definite else MAX_ITERATIONS
+        factors = MOST_FACTORS if definite else factors
         for _ in range(MOST_ARMINGS):
             balance = balance.with_pairs(self._pairs.those(self._armed))
             found = solve(balance, guess, part, factored, definite=definite, factors=factors)

@@ -33,7 +33,7 @@ from miurafab.origami.formats.crease_lines import (
     too_far,
     with_flat_lines,
 )
-from miurafab.origami.formats.line_crossings import split_lines
+from miurafab.origami.formats.line_crossings import lines_cross, split_lines
 from miurafab.origami.formats.loose_parts import LoosePartsError, refuse_loose_parts
 from miurafab.origami.formats.rulings import rulings
 from miurafab.origami.formats.settled_parts import DrawnSides, SettledParts
@@ -119,6 +119,9 @@ def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
         except PatternError as fault:
             refused = refused or fault
             continue
+        found = drawn.pattern
+        if share > TOLERANCES[0] and lines_cross(found.vertices_coords, found.edges_vertices):
+            continue  # ends were moved over other lines
         lost = drawn.lost + int((drawn.lengths < short).sum())
         if lost < least:
             chosen, least = share, lost

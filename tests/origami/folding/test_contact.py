@@ -109,6 +109,29 @@ def test_a_crumpled_sheet_against_all_pairs(seed, crumple):
     assert [tuple(pair) for pair in self_intersections(pattern).tolist()] == expected
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_facets_of_many_corners_meet_as_others_do(seed, monkeypatch):
+    """Three bent combs of 40 corners across each other: pairs of triangles are looked for."""
+    random = np.random.default_rng(seed)
+    x = np.repeat(np.arange(10.0), 2)
+    comb = np.concatenate(
+        [np.stack([x, np.tile([3.0, 1.0, 1.0, 3.0], 5)], 1), np.stack([x[::-1], -np.ones(20)], 1)]
+    )
+    points = []
+    for _ in range(3):
+        turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        bent = np.pad(comb - [4.5, 0.5], ((0, 0), (0, 1))) + random.normal(size=(40, 3)) * 0.1
+        points.append(bent @ turn + random.normal(size=3))
+    pattern = soup(
+        [tuple(p) for p in np.concatenate(points)], np.arange(120).reshape(3, 40).tolist()
+    )
+    pattern = replace(pattern, vertices_coords=np.tile(comb, (3, 1)))
+    found = self_intersections(pattern)
+    monkeypatch.setattr("miurafab.origami.folding.contact._MANY", math.inf)
+    assert len(found)
+    assert np.array_equal(found, self_intersections(pattern))
+
+
 def triangles_of(pattern: CreasePattern) -> CreasePattern:
     """The same sheet with each facet split in two."""
     faces, _ = triangulate(pattern.faces_vertices)

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from miurafab.errors import PatternError
-from miurafab.origami.folding import motion
+from miurafab.origami.energy.equilibrium import solve
+from miurafab.origami.folding import motion, ramp_walk
+from miurafab.origami.folding.judge_motion import motion_findings
 from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
 
@@ -104,3 +106,46 @@ def test_a_pattern_that_folds_in_a_sequence_is_told_by_its_folds() -> None:
     assert "25% of its folds end on the other side than their letter tells, the first" in said
     assert "With flat facets 2 of its 8 folds cannot begin from flat" in said
     assert "the first being edge 3" in said
+
+
+def test_a_large_sheet_is_followed_once_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A way lost by a sheet of 1,783 vertices was gone again three times, for minutes."""
+    pattern, ways = named_patterns.waterbomb_base(), []
+
+    def lost(*given: Any, **more: Any) -> Any:
+        ways.append(more)
+        way, verdict = ramp_motion(*given, **more)
+        return way, replace(verdict, complete=False, waiting_edges=np.empty(0, dtype=np.int64))
+
+    monkeypatch.setattr(motion, "ramp_motion", lost)
+    monkeypatch.setattr(motion, "MOST_AGAIN", 4 * len(pattern.vertices_coords))
+    assert motion_findings(find_motion(pattern, 4), ())[0].code != "followed-once"
+    assert len(ways) == 3
+    ways.clear()
+    told = {finding.code: finding for finding in motion_findings(find_motion(pattern, 5), ())}
+    assert len(ways) == 1
+    assert "ask for at most 4 `steps`" in told["followed-once"].sentence
+    monkeypatch.setattr(motion, "contacts", lambda found: [0])
+    assert find_motion(pattern, 5).verdict.followed_again == 4
+    monkeypatch.setattr(motion, "MOST_AGAIN", 0)
+    told = {finding.code: finding for finding in motion_findings(find_motion(pattern, 5), ())}
+    assert told["followed-once"].sentence.endswith("with softer paper or with contact.")
+
+
+def test_a_stiff_shape_that_is_not_found_is_looked_for_with_less_patience(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Curved creases have none, and spent most of their time looking for it in each frame."""
+    given = []
+
+    def solved(balance: Any, *others: Any, factors: int, **more: Any) -> Any:
+        found = solve(balance, *others, factors=factors, **more)
+        if balance.model.compliance.any():
+            return found
+        given.append(factors)
+        return found._replace(converged=len(given) == 5)
+
+    monkeypatch.setattr(ramp_walk, "solve", solved)
+    _, verdict = ramp_motion(named_patterns.waterbomb_base(), 7)
+    assert verdict.complete
+    assert given == [25, 12, 8, 8, 8, 25, 12]

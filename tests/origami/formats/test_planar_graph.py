@@ -12,6 +12,7 @@ from problems import regular
 
 from miurafab.errors import PatternError
 from miurafab.geometry.polygons import filled, signed_areas
+from miurafab.origami.folding.contact import overlaps
 from miurafab.origami.formats.crease_lines import CreaseLines, lines_of
 from miurafab.origami.formats.fold import parse_fold
 from miurafab.origami.formats.line_crossings import lines_cross
@@ -139,6 +140,15 @@ def test_ends_are_joined_beside_a_closed_line_that_stays() -> None:
     assert len(edge_set(found, "V")) == 2
     assert area_of(found) == pytest.approx(4 - 4 * 0.09 * np.sin(np.pi / 4), abs=0.03)
     assert {finding.code for finding in found.told} == {"joined-ends", "loose-parts", "holes"}
+
+
+@pytest.mark.parametrize(("count", "seed"), [(30, 0), (40, 4)])
+def test_no_tolerance_moves_ends_over_other_lines(count: int, seed: int) -> None:
+    """Of 48 such tangles 15 were read as facets on each other."""
+    ends = np.random.default_rng(seed).random((count, 2, 2))
+    found = pattern_from_lines(CreaseLines(ends, np.full(count, "M"), np.full(count, np.nan)))
+    assert not lines_cross(found.vertices_coords, found.edges_vertices)
+    assert overlaps(found).tolist() == []
 
 
 def test_windows_side_by_side_leave_polygons() -> None:
