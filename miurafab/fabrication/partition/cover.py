@@ -27,6 +27,9 @@ from miurafab.geometry.arrays import Floats, Ints
 from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.polygons import principal_axes
 
+_AT_A_TIME = 512
+"""Shapes that are compared with rectangles at a time, so that the numbers stay in the cache."""
+
 _NEAR = 4
 """The number of rectangles tried for each facet."""
 
@@ -174,10 +177,16 @@ class Relaxation:
     def least(self, rectangles: Floats) -> tuple[Ints, Floats]:
         """(A,) the rectangle with the least excess for each active shape, and that excess."""
         long, short = self.size[0] / 2 - self.margin, self.size[1] / 2 - self.margin
+        c, s = np.cos(rectangles[:, 2]), np.sin(rectangles[:, 2])
         over = np.empty(self.near.shape[::-1])
-        for row, column in zip(over, self.near.T, strict=True):
-            x, y = _seen(self.x, self.y, rectangles[column].T)
-            np.maximum(np.abs(x).max(axis=0) - long, np.abs(y).max(axis=0) - short, out=row)
+        for start in range(0, len(self.near), _AT_A_TIME):
+            some = slice(start, start + _AT_A_TIME)
+            near = np.ascontiguousarray(self.near[some].T)
+            x = self.x[:, None, some] - rectangles[near, 0]
+            y = self.y[:, None, some] - rectangles[near, 1]
+            cos, sin = c[near], s[near]
+            along, across = np.abs(x * cos + y * sin), np.abs(y * cos - x * sin)
+            over[:, some] = np.maximum(along.max(axis=0) - long, across.max(axis=0) - short)
         best = over.argmin(axis=0)
         shape = np.arange(len(best))
         return self.near[shape, best], over[best, shape]

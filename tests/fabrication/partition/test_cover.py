@@ -77,6 +77,21 @@ def test_nearest_tells_the_frames_that_a_point_lies_deepest_in():
     assert (np.sort(near, axis=1) == np.arange(12)).all()
 
 
+def test_each_shape_goes_to_the_frame_with_the_least_excess():
+    """More shapes than are compared at a time, and a margin within each frame."""
+    rng = np.random.default_rng(3)
+    relaxation = Relaxation(squares(40, 30, 10.0, 0.2), 130.0, 90.0)
+    rectangles = np.column_stack([rng.uniform(0, 400, (15, 2)), rng.uniform(0, 3, 15)])
+    relaxation.look(rectangles)
+    assert len(relaxation.active) > 600
+    relaxation.margin = 3.0
+    best, over = relaxation.least(rectangles)
+    shapes = relaxation.shapes[relaxation.sample][relaxation.active]
+    each = [excess(shapes, rectangles[near], 124.0, 84.0) for near in relaxation.near.T]
+    np.testing.assert_allclose(over, np.min(each, axis=0), atol=1e-9)
+    np.testing.assert_allclose(over, excess(shapes, rectangles[best], 124.0, 84.0), atol=1e-9)
+
+
 def test_the_gradient_of_the_loss_is_its_slope():
     rng = np.random.default_rng(5)
     relaxation = Relaxation(squares(40, 30, 10.0, 0.2), 130.0, 90.0)
