@@ -101,6 +101,15 @@ def test_both_blocks_are_named_and_what_was_set() -> None:
     )
 
 
+def test_what_the_opening_undid_is_told_beside_what_it_left() -> None:
+    class Port(FakeWire):
+        blocks = True
+
+    plan = plan_job(Job("job.nc", SAID), MACHINE)
+    result = deliver(plan, Port(controller("G20")), StopSignals())
+    assert [finding.code for finding in result.findings] == ["modes", "restarted"]
+
+
 def test_the_frame_is_traced_in_mm() -> None:
     device = controller("G20G91")
     wire = FakeWire(device)
