@@ -45,8 +45,10 @@ IMPORTED = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
 """Plugins are loaded before the processes are forked, and need no better messages of failure."""
 SEED = 18
 BROKEN = 99
-ENDS = {0: "survived", 1: "killed", 2: "killed", -1: "timeout"}
-"""What became of a fault by the exit code of pytest; 2 is a module that cannot be loaded."""
+ENDS = {0: "survived", 1: "killed", 2: "killed", 4: "killed", -1: "timeout"}
+"""What became of a fault by the exit code of pytest; 2 is a module that cannot be loaded, 4
+one that a ``conftest.py`` loads.
+"""
 FORK = multiprocessing.get_context("fork")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from typing import Any
 
 import pytest
 from dashes import dashes
@@ -135,16 +136,22 @@ def test_words_of_other_firmwares(state: str, waits: bool) -> None:
         assert wire.commands == b""
 
 
-@pytest.mark.parametrize("options", [{}, {"at": (0.0, 0.0)}])
+@pytest.mark.parametrize("options", [{}, {"at": (0.0, 0.0)}, {"home": True}])
 @pytest.mark.parametrize("resets", [True, False])
 def test_a_job_says_what_the_opening_of_its_port_undid(
-    resets: bool, options: dict[str, tuple[float, float]]
+    resets: bool, options: dict[str, Any]
 ) -> None:
     class Port(FakeWire):
         blocks = True
 
-    device = VirtualGrbl(virtual_settings(MACHINE), baud=115_200) if resets else board()
-    plan = plan_job(Job("a.nc", "M4 S0\nG1 X1 S9 F600\nM5\n"), MACHINE, SendOptions(**options))
+    homing = {22: 1, 24: 500, 25: 3000} if "home" in options else {}
+    device = VirtualGrbl(virtual_settings(MACHINE) | homing, baud=115_200)
+    if not resets:
+        device.advance(0.1)
+        device.take_output()
+    way = -5 if homing else 1  # a homed machine stands near 0 of -400 to 0
+    text = f"M4 S0\nG1 X{way} Y{way} S9 F600\nM5\n"
+    plan = plan_job(Job("a.nc", text), MACHINE, SendOptions(**options))
     findings = deliver(plan, Port(device), StopSignals()).findings
     assert [f.code for f in findings] == (["restarted"] if resets and not options else [])
 

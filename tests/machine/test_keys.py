@@ -410,7 +410,7 @@ def at_the_pause(at_pause: str, *keys: tuple[float, str]) -> tuple[FakeWire, lis
 
 
 def test_a_program_that_pauses_says_so_and_a_key_goes_on() -> None:
-    wire, seen = at_the_pause("wait", (5.0, "r"))
+    wire, seen = at_the_pause("wait", (0.2, "+"), (5.0, "r"))
     assert "waiting at paused.nc, line 4 (M0): r goes on" in seen
     assert burnt(wire) == pytest.approx(20, abs=0.2)
     assert wire.device.now > 5.0
