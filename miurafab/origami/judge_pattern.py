@@ -157,7 +157,7 @@ def judge(pattern: CreasePattern, evidence: Evidence) -> Iterator[Finding]:
     if found is not None:
         yield from _inexact(found)
     pairs = evidence.crossings
-    if len(pairs) and found is not None and pattern.grid is None and pattern.cells is None:
+    if found is not None and pattern.grid is None and pattern.cells is None:
         lying = _lie_together(pattern, pairs, found.worst)
         if lying.any():
             one, other = pairs[lying][0].tolist()

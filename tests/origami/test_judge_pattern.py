@@ -409,3 +409,12 @@ def test_a_report_has_status_advice_and_what_is_proved() -> None:
     assert Measurements.report(None).keys() == Measurements.report(measure(regular())).keys()
     flat = Measurements.report(measure(replace(regular(), folded_coords=None)))
     assert (flat["facets"], flat["quality"], flat["max_isometry"]) == (48, None, None)
+
+
+def test_a_value_shows_what_is_not_as_usual_and_a_notebook_all() -> None:
+    usual = measured(pieces=1, seam_mm=0.0, max_isometry=None, quality=None)
+    assert repr(usual) == "<Measurements facets=1, vertices=4, min_edge_mm=1, overlaps=0>"
+    found = audit(regular())
+    shown = found._repr_mimebundle_()["text/html"]
+    for name in ("valid", *vars(found.measurements)):
+        assert f">{name.replace('_', ' ')}<" in shown
