@@ -1,0 +1,18 @@
+"""The vector product against numpy's, to the last bit."""
+
+import numpy as np
+import pytest
+
+from miurafab.geometry.arrays import vector_product
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [((3,), (3,)), ((7, 3), (3,)), ((7, 3), (7, 3)), ((4, 1, 3), (5, 3)), ((0, 3), (0, 3))],
+)
+def test_the_vector_product_is_that_of_numpy(one, other):
+    random = np.random.default_rng(2)
+    a, b = random.normal(size=one), random.normal(size=other)
+    product, expected = vector_product(a, b), np.cross(a, b)
+    assert product.shape == expected.shape
+    assert (product == expected).all()
