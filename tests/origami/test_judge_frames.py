@@ -117,3 +117,44 @@ def test_a_frame_of_ordered_layers_that_is_not_folded_flat_is_told(document, tmp
     frame["vertices_coords"] = found["file_frames"][0]["vertices_coords"]
     (told,) = (each for each in judged(found, tmp_path).findings if each.code == "frame")
     assert "orders its facets and is not the sheet folded flat" in told.sentence
+
+
+def test_pairs_in_another_order_are_named(document, tmp_path):
+    found, frame = copied(document)
+    orders = frame["faceOrders"]
+    one, other = sorted(sorted(pair[:2]) for pair in (orders[2], orders[7]))
+    for n in (2, 7):
+        f, g, s = orders[n]
+        orders[n] = [f, g, -s]
+    (told,) = (each for each in judged(found, tmp_path).findings if each.code == "frame")
+    first = min(tuple(orders[n][:2]) for n in (2, 7))
+    assert told.where == tuple(sorted({*one, *other}))
+    assert told.sentence == (
+        "Frame 2 has another order of layers than the sheet for 2 pairs of facets, the first being "
+        f"{first[0]} and {first[1]}; write the file anew, or take the frame out."
+    )
+    orders[7] = [orders[7][0], orders[7][1], -orders[7][2]]
+    (told,) = (each for each in judged(found, tmp_path).findings if each.code == "frame")
+    assert told.where == tuple(sorted(orders[2][:2]))
+    assert "than the sheet for 1 pair of facets, the first" in told.sentence
+
+
+def test_a_frame_that_is_off_says_by_how_much(document, tmp_path):
+    found, _ = copied(document)
+    folded = found["file_frames"][0]
+    points = np.array(folded["vertices_coords"])
+    lengths = [
+        np.linalg.norm(np.subtract(*np.array(found["vertices_coords"])[[a, b]]))
+        for a, b in found["edges_vertices"]
+    ]
+    points[0, 0] += 1e-3 * np.mean(lengths)
+    found["file_frames"].append(dict(folded, vertices_coords=points.tolist()))
+    (told,) = (each for each in judged(found, tmp_path).findings if each.code == "stretched")
+    beside = [n for n, edge in enumerate(found["edges_vertices"]) if 0 in edge]
+    assert set(told.where) <= set(beside)
+    flat, moved = lengths, points
+    off = max(
+        abs(np.linalg.norm(moved[a] - moved[b]) - flat[n])
+        for n, (a, b) in enumerate(found["edges_vertices"])
+    )
+    assert f"are up to {off / np.mean(lengths):.1e} mean edges longer or shorter" in told.sentence
