@@ -156,22 +156,23 @@ def _from_value(
     from miurafab.origami.fitting.request import BED
     from miurafab.origami.fitting.result import FitResult
     from miurafab.workflow.bed_options import BedOptions
-    from miurafab.workflow.bed_size import with_stock
     from miurafab.workflow.design import Design, design
-    from miurafab.workflow.fit import fit
-    from miurafab.workflow.job_directory import JobDirectory
-    from miurafab.workflow.patterns import as_pattern, check
-    from miurafab.workflow.sheets import SheetJob
 
-    if isinstance(thing, JobDirectory | SheetJob):
-        _fitted_already(options, thing)
-        if isinstance(thing, SheetJob):
-            thing = thing.write(out or JOBS / thing.name)
-        return _from_directory(thing, machine)
+    if not isinstance(thing, str | os.PathLike):
+        from miurafab.workflow.job_directory import JobDirectory
+        from miurafab.workflow.sheets import SheetJob
+
+        if isinstance(thing, JobDirectory | SheetJob):
+            _fitted_already(options, thing)
+            if isinstance(thing, SheetJob):
+                thing = thing.write(out or JOBS / thing.name)
+            return _from_directory(thing, machine)
     path = Path(thing) if isinstance(thing, str | os.PathLike) else None
     if isinstance(thing, CreasePattern | FitResult) or (
         path is not None and path.suffix.lower() == ".fold"
     ):
+        from miurafab.workflow.patterns import as_pattern, check
+
         _fitted_already(options, thing)
         tell(0.1, "checking the pattern")
         pattern = as_pattern(thing)
@@ -186,6 +187,9 @@ def _from_value(
     }
     options = {name: value for name, value in options.items() if name not in of_bed}
     wanted = thing if isinstance(thing, Design) and not options else design(thing, **options)
+    from miurafab.workflow.bed_size import with_stock
+    from miurafab.workflow.fit import fit
+
     by_bed: dict[str, Any] = {}
     if wanted.request.size_mm == BED:
         by_bed = {"machine": machine, "material": material}

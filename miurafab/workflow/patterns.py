@@ -145,9 +145,10 @@ def check(pattern: PatternLike) -> Audit:
     >>> mf.check(mf.fit("plane", facets=(4, 4)))
     <Audit valid: 16 facets>
     """
+    found = as_pattern(pattern)
+
     from miurafab.surfaces.description import described_surface
 
-    found = as_pattern(pattern)
     named = os.fspath(pattern) if isinstance(pattern, str | os.PathLike) else "The pattern"
     with Reading(named, "a pattern with a target", PatternError):
         surface, missing = described_surface(found.target)

@@ -48,7 +48,7 @@ STARTS = {
     "convert --help": SHAPES,
     "tradeoff --help": SHAPES,
     "fit gone.toml -o x.fold": PATTERN,
-    "check gone.fold": PATTERN,
+    "check gone.fold": SHAPES,
     "layers gone.fold": SHAPES,
     "energy gone.fold": PATTERN,
     "convert gone.fold x.svg": SHAPES,
