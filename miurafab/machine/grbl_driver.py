@@ -129,8 +129,7 @@ class GrblDriver(StreamDriver):
             elif session.now() >= poll_at:
                 session.ask_status()
                 poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
-            events = session.receive(poll_at - session.now())
-            for event in events:
+            for event in session.receive(poll_at - session.now()):
                 streamer.take(event)
                 if isinstance(event, Ok | Error):
                     answered = session.now()
@@ -147,7 +146,7 @@ class GrblDriver(StreamDriver):
                     if event.state in ("Hold", "Door"):
                         answered = session.now()
                     self._watch_for_loss(event, answered)
-            if not events and session.now() - session.heard > ANSWER_S:
+            if session.now() - session.heard > ANSWER_S:
                 raise ControllerError(
                     f"The controller has said nothing for {ANSWER_S:g} s, not even to status "
                     f"queries, {streamer.where}."

@@ -412,6 +412,7 @@ def at_the_pause(at_pause: str, *keys: tuple[float, str]) -> tuple[FakeWire, lis
 def test_a_program_that_pauses_says_so_and_a_key_goes_on() -> None:
     wire, seen = at_the_pause("wait", (0.2, "+"), (5.0, "r"))
     assert "waiting at paused.nc, line 4 (M0): r goes on" in seen
+    assert "Run" in seen
     assert burnt(wire) == pytest.approx(20, abs=0.2)
     assert wire.device.now > 5.0
     assert not any(segment.standing for segment in wire.device.beam_log)
@@ -431,10 +432,39 @@ def test_a_pause_where_nobody_is_ends_the_job_dark() -> None:
 
 
 def test_a_hold_of_ones_own_is_no_pause_of_the_program() -> None:
-    wire, seen = at_the_pause("go on", (0.5, " "), (3.0, "r"))
+    wire, seen = at_the_pause("go on", (0.5, " "), (1.5, "+"), (3.0, "r"))
     assert burnt(wire) == pytest.approx(20, abs=0.2)
     assert wire.device.now > 3.0
     assert "Hold" in seen
+
+
+def told_by_the_machine(wire: FakeWire, *orders: tuple[float, bytes]) -> None:
+    """What somebody presses at the machine itself, and when."""
+    due = list(orders)
+
+    def press(call: int) -> None:
+        while due and wire.device.now >= due[0][0]:
+            wire.device.receive(due.pop(0)[1])
+
+    wire.before_call = press
+
+
+def test_a_lid_that_is_shut_again_is_no_pause_of_the_program() -> None:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
+    told_by_the_machine(wire, (1.0, b"\x84"))
+    job = Job("paused.nc", "M4 S0\nG1 X20 S500 F300\nM0\nG1 X30\nM5\n")
+    plan = replace(plan_job(job, MACHINE), at_pause="go on")
+    deliver(plan, wire, StopSignals(), keys=Script(wire.device, [(9.0, "r")]))
+    assert min(at for at, data in wire.written if b"~" in data) >= 9.0
+    assert burnt(wire) == pytest.approx(30, abs=0.2)
+
+
+def test_a_hold_at_the_machine_is_not_resumed_for_a_resume_that_was_heard() -> None:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
+    told_by_the_machine(wire, (8.0, b"!"), (12.0, b"~"))
+    keys = Script(wire.device, [(4.0, " "), (4.12, "r")])
+    deliver(plan_job(JOB, MACHINE), wire, StopSignals(), keys=keys)
+    assert wire.commands.count(b"~") == 1
 
 
 def test_a_pause_is_a_finding() -> None:

@@ -458,6 +458,16 @@ def test_a_frame_leaves_the_sheet_fresh_and_a_cut_does_not() -> None:
     assert session.state.loaded == "rows.nc"
 
 
+def test_after_a_restart_of_its_own_a_job_begins_where_somebody_says() -> None:
+    session, wire = here()
+    session.cut(JOB)
+    wire.device.power_cycle()
+    session.watch(2.0)
+    with pytest.raises(ControllerError, match="restarted by itself since"):
+        session.cut(JOB)
+    assert session.cut(replace(JOB, at=(0.0, 0.0))).lines == 15
+
+
 def test_a_journal_knows_how_far_the_controller_plans_ahead(tmp_path: Path) -> None:
     session, _ = here()
     session.cut(JOB, journal_path=tmp_path / "rows.journal")
