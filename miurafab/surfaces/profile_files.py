@@ -14,18 +14,17 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import numpy as np
-from ezdxf import path as curves
-from ezdxf.filemanagement import read
-from ezdxf.lldxf.const import DXFError
-from fontTools.pens.recordingPen import RecordingPen
-from fontTools.svgLib.path import parse_path
 
 from miurafab.errors import TargetError
 from miurafab.files import Reading, read_bytes, read_text
 from miurafab.geometry.arrays import Floats
+
+if TYPE_CHECKING:
+    from ezdxf import path as curves
 
 LARGEST = 1e9
 """No coordinate of a profile is larger, in its own unit."""
@@ -84,6 +83,10 @@ def _is_number(word: str) -> bool:
 
 
 def _of_dxf(path: Path) -> Iterator[curves.Path]:
+    from ezdxf import path as curves
+    from ezdxf.filemanagement import read
+    from ezdxf.lldxf.const import DXFError
+
     content = read_bytes(path, TargetError)
     try:
         drawing = read(io.StringIO(content.decode("utf-8", "replace").replace("\r\n", "\n")))
@@ -96,6 +99,9 @@ def _of_dxf(path: Path) -> Iterator[curves.Path]:
 
 def _of_svg(path: Path) -> Iterator[curves.Path]:
     """The parts of all paths, polylines, polygons and lines, with the second axis upwards."""
+    from fontTools.pens.recordingPen import RecordingPen
+    from fontTools.svgLib.path import parse_path
+
     text = read_text(path, TargetError, "an SVG drawing")
     if "<!ENTITY" in text:
         raise TargetError(f"{path} cannot be read as an SVG drawing: it declares XML entities.")
@@ -141,6 +147,8 @@ def _path_data(element: ElementTree.Element) -> str:
 
 def _drawn(strokes: Iterable[tuple[str, tuple[tuple[float, float], ...]]]) -> Iterator[curves.Path]:
     """The curves of a pen's ``strokes``."""
+    from ezdxf import path as curves
+
     curve = curves.Path()
     for stroke, places in strokes:
         points = [(x, -y) for x, y in places]

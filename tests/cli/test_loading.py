@@ -79,3 +79,12 @@ def test_a_command_starts_with_what_its_work_begins_with(words, tmp_path):
     loaded = set(done.stderr.splitlines()[-1].split())
     assert "miurafab.cli.program" in loaded
     assert set(LIBRARIES) & loaded <= STARTS[words]
+
+
+def test_the_studio_starts_without_the_readers_of_files():
+    said = "import sys, miurafab.studio.server; print(*sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert "miurafab.surfaces.profile_files" in loaded
+    readers = {"ezdxf", "fontTools", "trimesh", "matplotlib", "PIL", "scipy.interpolate"}
+    assert not readers & loaded
