@@ -278,3 +278,4 @@ def test_shapes_are_told_among_others() -> None:
     # Where a cut leaves facets of any shape, no dent is told.
     cut = replace(pattern, vertices_coords=dented, faces_vertices=padded)
     assert dented_facets(cut).tolist() == []
+    assert dented_facets(cut).dtype == np.int64

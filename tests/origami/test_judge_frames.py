@@ -35,7 +35,8 @@ def test_the_frame_folded_flat_is_proved_wherever_it_lies(document, tmp_path):
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     turn[:, 0] *= np.sign(np.linalg.det(turn))
     points = np.pad(np.array(frame["vertices_coords"]), ((0, 0), (0, 1)))[:, :3]
-    for moved in (points, points @ turn + 5.0):
+    over = points * [1.0, -1.0, -1.0]
+    for moved in (points, points @ turn + 5.0, over, over @ turn):
         frame["vertices_coords"] = moved.tolist()
         check = judged(found, tmp_path)
         assert check.valid, check.findings

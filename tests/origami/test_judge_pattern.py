@@ -389,6 +389,12 @@ def test_the_numbers_alone_are_those_of_the_audit() -> None:
     assert found.seam_mm == pytest.approx(lengths[two_pieces().seams[:, 1]].sum())
     assert (found.pieces, found.overlaps, found.self_intersections) == (2, 0, 0)
     assert found.min_edge_mm == pytest.approx(lengths.min())
+    pattern = regular()
+    near = pattern.folded_coords.copy()
+    near[1] = near[0] + 0.1 * (near[1] - near[0])
+    shorter = measure(replace(pattern, folded_coords=near)).min_edge_mm
+    assert shorter == pytest.approx(edge_lengths(near, pattern.edges_vertices).min())
+    assert shorter < measure(pattern).min_edge_mm / 5
 
 
 def test_a_report_has_status_advice_and_what_is_proved() -> None:

@@ -194,6 +194,14 @@ def test_letter_and_angle_are_judged_by_the_folded_form(
     assert found == [(code, (HINGE,), sentence) for code, sentence in told]
 
 
+def test_no_edge_folds_by_more_than_half_a_turn() -> None:
+    most = math.pi + FLAT_ANGLE
+    for angle, right in ((most, True), (math.nextafter(most, 4.0), False)):
+        for letter, sign in (("V", 1), ("M", -1)):
+            told = said(lettered(hinge(0.0), letter, sign * angle), form=False)
+            assert (told == []) is right
+
+
 def test_a_border_that_folds_or_lies_within_the_sheet_is_told() -> None:
     pattern = hinge(0.0)
     angles = pattern.edges_fold_angle.copy()
