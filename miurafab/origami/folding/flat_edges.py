@@ -63,21 +63,19 @@ def without_flat_edges(pattern: CreasePattern) -> Dissolved:
     same = Dissolved(pattern, pattern, vertices, edges, none, corners, places)
     if pattern.grid is not None or pattern.cells is not None:
         return same
-    part = _parts(pattern)
+    flat = _flat_edges(pattern)
+    part = components(len(pattern.faces_vertices), *pattern.edges_faces[flat].T)
+    one, other = pattern.edges_faces[(pattern.edges_faces >= 0).all(axis=1) & ~flat].T
+    ending = part[one[part[one] == part[other]]]  # a crease ends in the middle of the part
+    owners = np.split(np.argsort(part, kind="stable"), np.cumsum(np.bincount(part))[:-1])
     loops = {}
-    for number in np.flatnonzero(np.bincount(part) > 1).tolist():
-        loop = _loop(pattern, part == number)
+    for number in np.setdiff1d(np.flatnonzero(np.bincount(part) > 1), ending).tolist():
+        loop = _loop(pattern.faces_vertices[owners[number]])
         if loop is not None:
             loops[number] = loop
     if not loops:
         return same
-    return _dissolved(pattern, part, loops)
-
-
-def _parts(pattern: CreasePattern) -> Ints:
-    """(F,) the part of each facet; flat edges join the facets of a part."""
-    one, other = pattern.edges_faces[_flat_edges(pattern)].T
-    return components(len(pattern.faces_vertices), one, other)
+    return _dissolved(pattern, flat, part, loops)
 
 
 def _flat_edges(pattern: CreasePattern) -> Bools:
@@ -90,9 +88,8 @@ def _flat_edges(pattern: CreasePattern) -> Bools:
     return np.asarray(flat)
 
 
-def _loop(pattern: CreasePattern, own: Bools) -> list[int] | None:
-    """The corners around the facets ``own`` (F,); None if they make no polygon."""
-    faces = pattern.faces_vertices[own]
+def _loop(faces: Ints) -> list[int] | None:
+    """The corners around ``faces`` (n, k); None if they make no polygon."""
     following: dict[int, int] = {}
     sides = set()
     for face in faces.tolist():
@@ -103,9 +100,6 @@ def _loop(pattern: CreasePattern, own: Bools) -> list[int] | None:
         if tail in following:
             return None  # the facets touch themselves in a corner
         following[tail] = head
-    inner = (pattern.edges_faces >= 0) & own[pattern.edges_faces]
-    if (inner.all(axis=1) & ~_flat_edges(pattern)).any():
-        return None  # a crease ends in the middle
     start = outer[0][0]
     loop, at = [start], following[start]
     while at != start:
@@ -114,7 +108,9 @@ def _loop(pattern: CreasePattern, own: Bools) -> list[int] | None:
     return loop if len(loop) == len(outer) else None  # else there is a hole
 
 
-def _dissolved(pattern: CreasePattern, part: Ints, loops: dict[int, list[int]]) -> Dissolved:
+def _dissolved(
+    pattern: CreasePattern, flat: Bools, part: Ints, loops: dict[int, list[int]]
+) -> Dissolved:
     first = np.unique(part, return_index=True)[1]
     joined = np.isin(part, list(loops))
     kept = np.sort(np.concatenate([np.flatnonzero(~joined), first[list(loops)]]))
@@ -125,7 +121,7 @@ def _dissolved(pattern: CreasePattern, part: Ints, loops: dict[int, list[int]]) 
     width = max(map(len, polygons))
     faces = np.array([polygon + [-1] * (width - len(polygon)) for polygon in polygons])
     vertices = np.unique(faces[faces >= 0])
-    gone = _flat_edges(pattern) & joined[pattern.edges_faces[:, 0]]
+    gone = flat & joined[pattern.edges_faces[:, 0]]
     edges = np.flatnonzero(~gone)
     pieces, seams = pattern.pieces, pattern.seams
     place = np.cumsum(~gone) - 1

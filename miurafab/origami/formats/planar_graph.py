@@ -108,7 +108,7 @@ def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
     short = max(SHORT * median, SHORT_CURVED * lines.curve_tolerance)
     first = split_lines(lines, TOLERANCES[0] * median)
     parts = SettledParts.of(first, short, ROUNDED * median)
-    chosen, least, refused = None, len(lines.ends) + 1, None
+    chosen, least, refused = None, 0, None
     for share in TOLERANCES:
         near = share * median
         sides = first if share == TOLERANCES[0] else split_lines(lines, near)
@@ -123,7 +123,7 @@ def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
         if share > TOLERANCES[0] and lines_cross(found.vertices_coords, found.edges_vertices):
             continue  # ends were moved over other lines
         lost = drawn.lost + int((drawn.lengths < short).sum())
-        if lost < least:
+        if chosen is None or lost < least:
             chosen, least = share, lost
         if not least:
             break
