@@ -16,7 +16,7 @@ from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import UNCREASED, CreasePattern, restricted
 from miurafab.origami.energy.ruled import rulings_among
-from miurafab.origami.energy.triangles import split_facets
+from miurafab.origami.energy.triangles import facet_triangles
 from miurafab.origami.folding.kinematics import FoldingMotion
 
 
@@ -134,17 +134,34 @@ def _dissolved(
         seams=None if seams is None else place[seams],
     )
     inside = np.setdiff1d(pattern.edges_vertices, vertices)
-    corners, places = _places(lean, pattern.vertices_coords[inside])
+    real = pattern.faces_vertices >= 0
+    facet_of = np.full(part.max() + 1, -1)
+    facet_of[part[kept]] = np.arange(len(kept))
+    owner = np.full(len(pattern.vertices_coords), -1)
+    owner[pattern.faces_vertices[real]] = np.repeat(facet_of[part], real.sum(axis=1))
+    corners, places = _places(lean, pattern.vertices_coords[inside], owner[inside])
     return Dissolved(pattern, lean, vertices, edges, inside, corners, places)
 
 
-def _places(pattern: CreasePattern, points: Floats) -> tuple[Ints, Floats]:
-    """The triangle (n, 3) of ``pattern`` around each of ``points`` (n, 2), and their barycentric
-    coordinates (n, 3) in it.
+def _places(pattern: CreasePattern, points: Floats, facet: Ints) -> tuple[Ints, Floats]:
+    """The triangle (n, 3) of the ``facet`` (n,) of ``pattern`` around each of ``points`` (n, 2),
+    of any for -1, and their barycentric coordinates (n, 3) in it.
     """
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
-    triangles, _ = split_facets(flat, pattern.faces_vertices)
-    corners = pattern.vertices_coords[triangles]
+    triangles, owner = facet_triangles(flat, pattern.faces_vertices)
+    order = np.argsort(owner, kind="stable")
+    ends = np.cumsum(np.bincount(owner, minlength=len(pattern.faces_vertices)))
+    around, places = np.empty((len(points), 3), dtype=np.int64), np.empty((len(points), 3))
+    for number in np.unique(facet).tolist():
+        first = ends[number - 1] if number > 0 else 0
+        own = triangles if number < 0 else triangles[order[first : ends[number]]]
+        here = np.flatnonzero(facet == number)
+        around[here], places[here] = _places_in(pattern.vertices_coords[own], own, points[here])
+    return around, places
+
+
+def _places_in(corners: Floats, triangles: Ints, points: Floats) -> tuple[Ints, Floats]:
+    """The ``triangles`` (T, 3) with ``corners`` (T, 3, 2) around ``points``, and their places."""
     area = signed_areas(corners)
     shares = np.empty((len(points), len(triangles), 3))
     for corner in range(3):

@@ -10,6 +10,8 @@ import pytest
 
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.ruled import rulings_among as rulings
+from miurafab.origami.folding import flat_edges
 from miurafab.origami.folding.flat_edges import without_flat_edges
 from miurafab.origami.folding.kinematics import CLOSED_FORM, FROM_FLAT
 from miurafab.origami.folding.motion import find_motion
@@ -108,3 +110,31 @@ def test_creases_cut_in_two_by_a_stray_line_keep_the_closed_form() -> None:
     assert motion.is_rigid
     angles = np.abs(motion.fold_angles[:, np.isin(pattern.edges_assignment, ("M", "V"))])
     assert angles == pytest.approx(angles[:, :1].repeat(angles.shape[1], 1), abs=1e-12)
+
+
+def test_the_flat_edges_of_many_facets_are_looked_for_once(monkeypatch) -> None:
+    """They were looked for anew for each joined facet: 28,000 facets took minutes. Each cell has a
+    vertex in its middle, which stays there."""
+    calls = []
+
+    def counted(*given):
+        calls.append(given)
+        return rulings(*given)
+
+    monkeypatch.setattr(flat_edges, "rulings_among", counted)
+    lines = [((0, y), (4, y), "V", 90.0) for y in (1, 2, 3)]
+    lines += [((x, 0), (x, 4), "M", 90.0) for x in (1, 2, 3)]
+    for x in range(4):
+        for y in range(4):
+            corners = ((x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1))
+            lines += [(corner, (x + 0.25, y + 0.5), "F", 0.0) for corner in corners]
+    drawn = named_patterns.drawn([*lines, *named_patterns.border((0, 0), (4, 0), (4, 4), (0, 4))])
+    found = flat_edges.without_flat_edges(drawn)
+    assert len(drawn.faces_vertices) == 64
+    assert found.pattern.faces_vertices.shape == (16, 4)
+    assert len(calls) == 1
+    corners = found.pattern.vertices_coords[found.corners]
+    places = np.einsum("nc,nck->nk", found.places, corners)
+    assert places == pytest.approx(drawn.vertices_coords[found.inside])
+    assert found.places.min() > -1e-9
+    assert len(found.inside) == 16
