@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from miurafab.errors import GcodeError
 from miurafab.gcode.block_errors import BlockError
 from miurafab.gcode.words import split_words
-from miurafab.machine.known_controller import MODES, KnownController
+from miurafab.machine.known_controller import KnownController
 
 _LASER_MODE = 32
 _BURNING = (1.0, 2.0, 3.0)
@@ -74,7 +74,6 @@ class RestingBeam:
         """Hold ``line`` back if its ``text`` would light the resting beam; ``starts``: after each
         reset, too.
         """
-        self._known.refresh(MODES)
         state = self._known.state
         if state.modes:
             self._since.clear()  # else the controller does not tell them while it moves

@@ -432,7 +432,7 @@ def test_a_pause_where_nobody_is_ends_the_job_dark() -> None:
 
 
 def test_a_hold_of_ones_own_is_no_pause_of_the_program() -> None:
-    wire, seen = at_the_pause("go on", (0.5, " "), (1.5, "+"), (3.0, "r"))
+    wire, seen = at_the_pause("go on", (0.5, " "), (3.0, "r"))
     assert burnt(wire) == pytest.approx(20, abs=0.2)
     assert wire.device.now > 3.0
     assert "Hold" in seen
@@ -449,12 +449,16 @@ def told_by_the_machine(wire: FakeWire, *orders: tuple[float, bytes]) -> None:
     wire.before_call = press
 
 
-def test_a_lid_that_is_shut_again_is_no_pause_of_the_program() -> None:
+@pytest.mark.parametrize(("lid", "keys"), [([(1.0, b"\x84")], []), ([], [(1.0, " "), (2.0, "+")])])
+def test_neither_a_lid_that_is_shut_again_nor_a_hold_is_a_pause_of_the_program(
+    lid: list[tuple[float, bytes]], keys: list[tuple[float, str]]
+) -> None:
+    """Which would go on by itself."""
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
-    told_by_the_machine(wire, (1.0, b"\x84"))
+    told_by_the_machine(wire, *lid)
     job = Job("paused.nc", "M4 S0\nG1 X20 S500 F300\nM0\nG1 X30\nM5\n")
     plan = replace(plan_job(job, MACHINE), at_pause="go on")
-    deliver(plan, wire, StopSignals(), keys=Script(wire.device, [(9.0, "r")]))
+    deliver(plan, wire, StopSignals(), keys=Script(wire.device, [*keys, (9.0, "r")]))
     assert min(at for at, data in wire.written if b"~" in data) >= 9.0
     assert burnt(wire) == pytest.approx(30, abs=0.2)
 

@@ -110,6 +110,22 @@ def test_what_the_opening_undid_is_told_beside_what_it_left() -> None:
     assert [finding.code for finding in result.findings] == ["modes", "restarted"]
 
 
+def test_overrides_are_told_beside_the_modes() -> None:
+    device = controller("G20")
+
+    class Faster:
+        keys = "+"
+
+        def pressed(self) -> str:
+            keys = self.keys if device.beam_on else ""
+            self.keys = "" if keys else self.keys
+            return keys
+
+    plan = plan_job(Job("job.nc", SAID.replace("F3000", "F300")), MACHINE)
+    result = deliver(plan, FakeWire(device), StopSignals(), keys=Faster())
+    assert [finding.code for finding in result.findings] == ["modes", "overrides"]
+
+
 def test_the_frame_is_traced_in_mm() -> None:
     device = controller("G20G91")
     wire = FakeWire(device)

@@ -11,7 +11,7 @@ import pytest
 from session_walk import FRAME, HOMING, JOB, MACHINE
 from wires import FakeWire
 
-from miurafab.errors import ControllerError, JobStopped, MachineError, PortError
+from miurafab.errors import ControllerError, GcodeError, JobStopped, MachineError, PortError
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.settings import Settings
 from miurafab.machine.journal import read_journal
@@ -215,6 +215,17 @@ def test_a_hold_pressed_at_the_machine_is_no_pause_of_the_program() -> None:
 def test_the_power_of_a_beam_at_rest(lines: str, laser_mode: bool, power: float) -> None:
     words = [(word[0], float(word[1:])) for word in lines.split()]
     assert resting_power(words, laser_mode=laser_mode) == power
+
+
+def test_what_was_typed_counts_no_more_once_the_modes_are_told() -> None:
+    session, wire = here(s32=1)
+    session.say("G1 X1 F600")
+    session.settle()
+    session.set_origin()  # which leaves G1
+    session.say("M3 S500")
+    assert not wire.device.beam_on
+    with pytest.raises(GcodeError, match="would be on, with S500"):
+        session.say("G1 X2 F600")
 
 
 def test_an_abort_forgets_the_arrows_that_are_still_held() -> None:
