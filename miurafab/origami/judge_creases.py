@@ -279,4 +279,4 @@ def _fold_faults(pattern: CreasePattern, folds: MeasuredFolds) -> Iterator[_Faul
 
 
 def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.6g} degrees"
+    return f"{math.degrees(angle) + 0.0:.6g} degrees"  # 0 and not -0

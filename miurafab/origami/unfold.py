@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from miurafab.geometry.angles import fold_angles
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.polygons import edge_lengths, facet_normals
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
@@ -133,8 +133,11 @@ def turned_upright(flat: Floats, along: Ints) -> Floats:
     return np.asarray(turned - turned.min(axis=0))
 
 
-def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
-    """``pattern`` with its fold angles measured in its folded form, for facets of any shape.
+def with_angles_of_the_folded_form(
+    pattern: CreasePattern, own: Bools | None = None
+) -> CreasePattern:
+    """``pattern`` with its fold angles measured in its folded form, for facets of any shape, but
+    for the edges whose ``own`` (E,) letter and angle are known.
 
     The sign makes a mountain or valley; borders, cuts and joins stay. Half a turn to either side is
     the same form, so there a mountain stays one. The fold angle at a crease or facet without extent
@@ -154,8 +157,8 @@ def with_angles_of_the_folded_form(pattern: CreasePattern) -> CreasePattern:
     letter = np.where(angle > FLAT_ANGLE, "V", np.where(angle < -FLAT_ANGLE, "M", "F"))
     folds = inner & ~np.isin(pattern.edges_assignment, ("B", "C", "J"))
     kept = np.where(~inner & (pattern.edges_assignment != "C"), "B", pattern.edges_assignment)
-    return replace(
-        pattern,
-        edges_assignment=np.where(folds, letter, kept),
-        edges_fold_angle=np.where(folds, angle, 0.0),
-    )
+    letters, angles = np.where(folds, letter, kept), np.where(folds, angle, 0.0)
+    if own is not None:
+        letters = np.where(own, pattern.edges_assignment, letters)
+        angles = np.where(own, pattern.edges_fold_angle, angles)
+    return replace(pattern, edges_assignment=letters, edges_fold_angle=angles)

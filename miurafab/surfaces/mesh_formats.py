@@ -50,7 +50,8 @@ def read_off(content: bytes) -> tuple[Floats, Ints]:
     lines = [line.split(b"#")[0].split() for line in content.splitlines()]
     lines = [line for line in lines if line]
     if not lines or not lines[0][0].upper().endswith(b"OFF"):
-        raise ValueError("it does not begin with OFF")
+        begin = lines[0][0][:20].decode("ascii", "replace") if lines else ""
+        raise ValueError(f"its first word is '{shown(begin)}' and not OFF")
     word, first = lines[0][0], lines[0][1:]
     head = word.upper()[:-3]
     if b"BINARY" in first:

@@ -269,8 +269,9 @@ def parse_fold(document: Any) -> CreasePattern:
             points_at(frames[place], "vertices_coords"),
             points_at(chosen, "vertices_coords"),
         )
-    if pattern.folded_coords is not None and key.get("edges_foldAngle") is None:
-        pattern = with_angles_of_the_folded_form(pattern)
+    if pattern.folded_coords is not None:
+        own = np.isfinite(fold_angles_in(key, assignment, np.nan))
+        pattern = with_angles_of_the_folded_form(pattern, own)
     further = sum("foldedForm" in classes_of(frame) for frame in frames) > 1
     return pattern if further else _without_loose_vertices(pattern)
 

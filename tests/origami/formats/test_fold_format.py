@@ -280,3 +280,27 @@ def test_any_value_in_any_place_is_read_or_refused_in_a_sentence() -> None:
         except PatternError as fault:
             refused.append(str(fault))
     assert all(sentence.endswith(".") for sentence in refused)
+
+
+def test_an_angle_that_is_null_is_that_of_the_folded_form() -> None:
+    """It was taken as half a turn, and a check said that the file gave it so."""
+    square = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    document = {
+        "file_spec": 1.2,
+        "frame_classes": ["creasePattern"],
+        "vertices_coords": square,
+        "edges_vertices": [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]],
+        "edges_assignment": ["B", "B", "B", "B", "M"],
+        "edges_foldAngle": [0, 0, 0, 0, None],
+        "faces_vertices": [[0, 1, 2], [0, 2, 3]],
+    }
+    assert parse_fold(document).edges_fold_angle[4] == -np.pi
+    corner = [0.5, 0.5, 0.5**0.5]  # turned up by a right angle about the diagonal
+    form = {"frame_classes": ["foldedForm"], "vertices_coords": [[*p, 0] for p in square[:3]]}
+    form["vertices_coords"].append(corner)
+    found = parse_fold({**document, "file_frames": [{**document, **form}]})
+    assert np.degrees(found.edges_fold_angle) == pytest.approx([0, 0, 0, 0, 90])
+    assert found.edges_assignment.tolist() == [*"BBBB", "V"]
+    given = {**document, "edges_foldAngle": [0, 0, 0, 0, 90]}
+    kept = parse_fold({**given, "file_frames": [{**document, **form}]})
+    assert kept.edges_assignment[4] == "M"  # as the file says, which a check finds
