@@ -483,7 +483,23 @@ def test_a_journal_knows_how_far_the_controller_plans_ahead(tmp_path: Path) -> N
     session, _ = here()
     session.cut(JOB, journal_path=tmp_path / "rows.journal")
     (record,) = read_journal(tmp_path / "rows.journal")
-    assert (record.blocks, record.ended) == (15, "done")
+    assert (record.blocks, record.from_line, record.ended) == (15, 1, "done")
+
+
+def test_a_job_that_is_only_read_burns_no_sheet() -> None:
+    session, _ = here()
+    session.cut(replace(JOB, options=replace(JOB.options, check_mode=True)))
+    assert session.state.loaded is None
+
+
+def test_the_transcript_of_a_job_ends_with_it(tmp_path: Path) -> None:
+    session, _ = here()
+    session.cut(JOB, transcript_path=tmp_path / "rows.transcript")
+    kept = (tmp_path / "rows.transcript").read_text()
+    assert session.conversation.transcript is None
+    session.say("M8")
+    assert "M8" not in kept
+    assert (tmp_path / "rows.transcript").read_text() == kept
 
 
 def test_who_is_said_to_own_a_port_owns_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
