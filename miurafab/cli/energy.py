@@ -137,13 +137,13 @@ def _unfolded(answer: dict[str, Any]) -> dict[str, Any]:
 
 def _pulled(answer: dict[str, Any]) -> dict[str, Any]:
     """The figures of a pull with names and units for a person."""
-    one, other = answer["pulled"]
+    (one, other), left = answer["pulled"], answer["set_mm"]
     facts: dict[str, Any] = {
         "Converged": answer["converged"],
         "Pulled": f"vertices {one} and {other}, {answer['distance_mm']:.1f} mm apart, by "
-        f"{100 * answer['strain']:.3g} %",
+        f"{100 * answer['cycles'][0]['strain']:.3g} %",
         "Force": f"{answer['force_n']:.3g} N, {answer['largest_force_n']:.3g} N at most",
-        "Stays longer by": f"{answer['set_mm']:.3g} mm",
+        **({} if left is None else {"Stays longer by": f"{left:.3g} mm"}),
         "Creases that yield": f"{100 * answer['yielded']:.3g} %",
         "Material": f"{answer['thickness_mm']:.3g} mm thick, modulus "
         f"{answer['modulus_pa'] / 1e9:.3g} GPa, crease length {answer['crease_length_mm']:.3g} mm",

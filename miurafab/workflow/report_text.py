@@ -16,7 +16,7 @@ from miurafab.workflow.dry_run import clock_text, length_text
 
 HEADLINES = {
     "converged": "The sheet fits and folds from flat paper.",
-    "infeasible": "The sheet folds, but not within what was asked.",
+    "infeasible": "A sheet was found, but it is not valid.",
     "stalled": "No sheet was found.",
     "interrupted": "The search was interrupted; this is the best sheet up to then.",
     "invalid": "This pattern has faults.",

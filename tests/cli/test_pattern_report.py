@@ -68,7 +68,7 @@ def test_a_fit_that_misses_a_limit_says_so_before_its_figures(run):
     missed = run("fit", "hypar", *asked)
     assert missed.returncode == 1
     first, second = missed.stdout.splitlines()[:2]
-    assert first == "The sheet folds, but not within what was asked."
+    assert first == "A sheet was found, but it is not valid."
     assert "1 mm" in second
     assert _rows(missed.stdout)["File"] == "h.rejected.fold"
 
@@ -125,6 +125,12 @@ def test_energy_and_force_are_told_with_their_units(run, tmp_path):
     assert rows["Pulled"] == f"vertices {one} and {other}, {apart}"
     assert rows["Force"].startswith(f"{report['force_n']:.3g} N, ")
     assert rows["Material"].startswith(f"{report['thickness_mm']:.3g} mm thick, modulus ")
+    lost = run("energy", "p.fold", "--pull", "corners", "--steps", "3", "--strain", "2")
+    assert lost.returncode == 1, lost.stderr
+    reached = float(re.search(r"lost at a strain of ([\d.e+-]+),", lost.stdout)[1])
+    found = _rows(lost.stdout)
+    assert found["Pulled"].endswith(f" by {100 * reached:.3g} %")
+    assert "Stays longer by" not in found
     layers, order = _both(run, "layers", "p.fold")
     assert layers["Layers have an order"] == "yes"
     assert layers["Overlapping pairs"] == str(order["pairs"])

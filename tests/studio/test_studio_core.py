@@ -198,7 +198,7 @@ def test_a_fit_that_misses_a_limit_says_so(done):
     assert done.fit("plane", "4x4", min_edge="900mm").status == 200
     pattern = done.state()["pattern"]
     assert pattern["status"] == "infeasible"
-    assert pattern["headline"] == "The sheet folds, but not within what was asked."
+    assert pattern["headline"] == "A sheet was found, but it is not valid."
     assert "900 mm asked for" in pattern["advice"]
     done.post("sheets", {"machine": "grbl-laser-400", "material": "card-250"})
     job = done.state()["job"]
