@@ -129,7 +129,8 @@ class GrblDriver(StreamDriver):
             elif session.now() >= poll_at:
                 session.ask_status()
                 poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
-            for event in session.receive(poll_at - session.now()):
+            events = session.receive(poll_at - session.now())
+            for event in events:
                 streamer.take(event)
                 if isinstance(event, Ok | Error):
                     answered = session.now()
@@ -146,7 +147,7 @@ class GrblDriver(StreamDriver):
                     if event.state in ("Hold", "Door"):
                         answered = session.now()
                     self._watch_for_loss(event, answered)
-            if session.now() - session.heard > ANSWER_S:
+            if not events and session.now() - session.heard > ANSWER_S:
                 raise ControllerError(
                     f"The controller has said nothing for {ANSWER_S:g} s, not even to status "
                     f"queries, {streamer.where}."
@@ -158,12 +159,11 @@ class GrblDriver(StreamDriver):
 
         Raises :class:`~miurafab.errors.PersonNeeded` if nobody is there.
         """
-        program = self.plan.program
-        if program is None or not _rests(report) or self.held:
+        program, owed = self.plan.program, self._session.connection.in_flight
+        if program is None or not owed or not _rests(report) or self.held:
             return None
-        pauses = program.event_line[program.event_kind == PAUSE]
-        line = next((int(n) for n in pauses if n > self.line), None)
-        if line is None:
+        line = owed[0].number  # GRBL answers M0 when its hold is over, and all before it earlier
+        if line not in program.event_line[program.event_kind == PAUSE]:
             return None
         where = f"{self.plan.job.name}, line {line}"
         if self.plan.at_pause == "stop":

@@ -37,6 +37,7 @@ from miurafab.machine.keys import (
     terminal_keys,
 )
 from miurafab.machine.planning import SendOptions, plan_job
+from miurafab.machine.progress import Progress
 from miurafab.machine.sender import StreamResult, deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.trace_box import frame_job
@@ -461,6 +462,36 @@ def test_neither_a_lid_that_is_shut_again_nor_a_hold_is_a_pause_of_the_program(
     deliver(plan, wire, StopSignals(), keys=Script(wire.device, [*keys, (9.0, "r")]))
     assert min(at for at, data in wire.written if b"~" in data) >= 9.0
     assert burnt(wire) == pytest.approx(30, abs=0.2)
+
+
+@pytest.mark.parametrize("at", [1.0, 6.0])
+def test_a_hold_at_the_machine_is_no_pause_before_or_after_one_of_the_program(at: float) -> None:
+    """Which would go on by itself; the first is among 40 moves, the second in the dwell."""
+    moves = "".join(f"G1 X{x / 2}\n" for x in range(1, 41))
+    job = Job("paused.nc", f"M4 S500 F300\n{moves}M0\nG4 P4\nM0\nG1 X30\nM5\n")
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
+    told_by_the_machine(wire, (at, b"!"), (at + 9, b"~"))
+    deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
+    assert not any(at < when < at + 9 for when, data in wire.written if b"~" in data)
+    assert wire.commands.count(b"~") == 2
+    assert burnt(wire) == pytest.approx(30, abs=0.2)
+
+
+@pytest.mark.parametrize("busy_s", [4.0, 9.0])
+def test_a_program_that_is_slow_to_show_progress_is_no_silence_of_the_controller(
+    busy_s: float,
+) -> None:
+    """As a terminal is that somebody holds with Ctrl-S."""
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
+    busy = [busy_s]
+
+    def show(now: Progress) -> None:
+        if now.lines_acknowledged > 5 and busy:
+            wire.device.advance(busy.pop())
+
+    result = deliver(plan_job(JOB, MACHINE), wire, StopSignals(), on_progress=show)
+    assert result.lines == plan_job(JOB, MACHINE).lines
+    assert not busy
 
 
 def test_a_hold_at_the_machine_is_not_resumed_for_a_resume_that_was_heard() -> None:
