@@ -140,7 +140,7 @@ def _facts(answer: dict[str, Any]) -> dict[str, Any]:
     facts = {
         "Motion": f"{answer['motion']}, {by}{answer['method']}",
         "Folds rigidly": "yes" if answer["rigid"] else "no",
-        "Largest strain": f"{answer['max_strain']:.1e} of a side",
+        "Largest strain": f"{answer['max_strain']:.1e} of a side or diagonal",
     }
     if by:
         facts["Loops close"] = f"within {answer['max_mismatch']:.1e} of the mean edge"

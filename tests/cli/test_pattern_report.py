@@ -97,7 +97,7 @@ def test_a_motion_is_told_with_names_and_units(run, tmp_path):
     assert rows == {
         "Motion": f"{report['motion']}, from flat",
         "Folds rigidly": "yes",
-        "Largest strain": f"{report['max_strain']:.1e} of a side",
+        "Largest strain": f"{report['max_strain']:.1e} of a side or diagonal",
         "Fold angles": f"{report['angle_error_deg']:.1f}° from those asked for, in the mean",
         "Wrong signs": "0 % of the creases",
         "Stable": "in every frame",
