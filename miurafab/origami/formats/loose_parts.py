@@ -34,7 +34,7 @@ def refuse_loose_parts(points: Floats, sides: Ints, faces: Ints, piece: Ints) ->
     :class:`LoosePartsError`.
     """
     corner = faces[np.unique(piece, return_index=True)[1], 0]
-    depth = _facets_around(points, faces, piece, points[corner])
+    depth = facets_around(points, faces, piece, points[corner])
     loose = np.flatnonzero(depth)
     if not len(loose):
         return
@@ -65,8 +65,10 @@ def _beside(points: Floats, sides: Ints, faces: Ints) -> Floats:
     return np.array(lines)
 
 
-def _facets_around(points: Floats, faces: Ints, piece: Ints, places: Floats) -> Ints:
-    """(n,) of each piece the number of facets of others in which its place (n, 2) lies."""
+def facets_around(points: Floats, faces: Ints, piece: Ints, places: Floats) -> Ints:
+    """(n,) the number of facets of other pieces in which the place (n, 2) of each piece lies;
+    of all facets where their ``piece`` (F,) is -1.
+    """
     start = points[filled(faces)]
     end = np.roll(start, -1, axis=1)
     low, high = (

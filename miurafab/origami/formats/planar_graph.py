@@ -34,7 +34,7 @@ from miurafab.origami.formats.crease_lines import (
     with_flat_lines,
 )
 from miurafab.origami.formats.line_crossings import lines_cross, split_lines
-from miurafab.origami.formats.loose_parts import LoosePartsError, refuse_loose_parts
+from miurafab.origami.formats.loose_parts import LoosePartsError, facets_around, refuse_loose_parts
 from miurafab.origami.formats.rulings import rulings
 from miurafab.origami.formats.settled_parts import DrawnSides, SettledParts
 from miurafab.origami.formats.told import (
@@ -180,6 +180,10 @@ def _joined(lines: CreaseLines, drawn: DrawnSides) -> _Joined:
     angle = np.where(np.isnan(angle) | (count == 1), flat_folded, angle)
     stands_for = np.where(np.isin(stands_for, rows), stands_for, -1)
     lengths = edge_lengths(drawn.points, every)
+    gone = np.flatnonzero(stands_for < 0)
+    middles = drawn.points[every[gone]].mean(axis=1)
+    beyond = facets_around(points, faces, np.full(len(faces), -1), middles) == 0
+    lengths[gone[beyond]] = 0.0  # where no paper is, nothing is lost
     pattern = CreasePattern(
         vertices_coords=points[used] - origin,
         edges_vertices=renumber[sides],

@@ -19,7 +19,7 @@ def told_of_lines(
 ) -> tuple[Finding, ...]:
     """What became of ``lines``, of which m sides were made: ``source`` (m,) is the line of each
     side, ``stands_for`` (m,) the side of the pattern in its place, -1 for none, ``lengths`` (m,)
-    how long it is, and ``holes`` the number of holes.
+    how long it is on the paper, and ``holes`` the number of holes.
     """
     return tuple(_told(lines, source, stands_for, lengths, holes))
 

@@ -177,6 +177,15 @@ def test_lines_that_are_lost_in_part_are_told_and_joined_if_they_can_be() -> Non
     assert over.told == ()
 
 
+@pytest.mark.parametrize("beyond", [0.06, 0.5])
+def test_a_crease_that_reaches_beyond_the_border_leaves_the_border_as_it_is(beyond) -> None:
+    """A wide tolerance led the border out to the ends of the crease."""
+    found = pattern_from_lines(drawn(*SQUARE, ("V", 1, -beyond, 1, 2 + beyond)))
+    assert edge_set(found, "V") == {((1, 0), (1, 2))}
+    assert area_of(found) == pytest.approx(4)
+    assert found.told == ()
+
+
 def test_edges_of_a_file_with_a_window_are_lines_of_a_drawing() -> None:
     """They were two facets on each other, of which a check said that they overlap."""
     closed = ring("B", 1, 1, 0.5, 8)
