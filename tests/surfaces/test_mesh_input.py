@@ -81,6 +81,18 @@ def test_a_border_that_touches_itself_is_parted_there() -> None:
     assert np.allclose(points[parted], vertices[faces])
 
 
+def test_many_triangles_turned_at_random_are_one_sheet() -> None:
+    """From 46,341 triangles on, products of their numbers overflowed: a Moebius strip, it said."""
+    first = np.arange(23_500)[:, None]
+    vertices = np.stack([*np.divmod(np.arange(47_002), 2), np.zeros(47_002)], axis=1)
+    faces = np.hstack([2 * first + [0, 2, 1], 2 * first + [1, 2, 3]]).reshape(-1, 3)
+    turned = np.random.default_rng(0).random(len(faces)) < 0.5
+    faces[turned] = faces[turned, ::-1]
+    points, found = one_sheet(vertices, faces, "mesh")
+    a, b, c = points[found].transpose(1, 0, 2)
+    assert len(set(np.sign(np.cross(b - a, c - a)[:, 2]))) == 1
+
+
 def test_welds_close_gaps_and_leave_wider_ones() -> None:
     vertices, faces = mesh("gaps")
     prepared = prepare(vertices, faces, "gaps.stl")
