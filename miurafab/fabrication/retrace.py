@@ -13,6 +13,7 @@ tabs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -92,11 +93,16 @@ def _same_labels(told: tuple[AbsentLabel, ...], own: tuple[AbsentLabel, ...]) ->
     names = [[(each.patch, each.text) for each in labels] for labels in (told, own)]
     if names[0] != names[1]:
         return False
-    places = [
-        [(each.x_mm, each.y_mm, each.height_mm, each.rotation_deg) for each in labels]
-        for labels in (told, own)
+    apart = [
+        (
+            one.x_mm - other.x_mm,
+            one.y_mm - other.y_mm,
+            one.height_mm - other.height_mm,
+            math.remainder(one.rotation_deg - other.rotation_deg, 360.0),  # -180 is 180
+        )
+        for one, other in zip(told, own, strict=True)
     ]
-    return np.allclose(places[0], places[1], rtol=0, atol=NEAR_MM)
+    return np.allclose(apart, 0.0, rtol=0, atol=NEAR_MM)
 
 
 def patches_on_sheets(

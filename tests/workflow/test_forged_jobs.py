@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -352,3 +353,23 @@ def test_a_manifest_that_does_not_name_the_pattern_of_the_layout_is_refused(job:
 def test_another_schema_is_refused_by_its_name(job: Path, schema: str | None) -> None:
     with pytest.raises(InputError, match=r"has the schema .*; this version reads 'miurafab-job/1'"):
         rewritten(job, schema=schema)
+
+
+def test_an_absent_label_that_runs_to_the_left_is_the_same_by_either_name_of_half_a_turn(
+    tmp_path: Path,
+) -> None:
+    """Rounding decides between 180 and -180 degrees."""
+    pattern = regular(5, 5)
+    c, s = np.cos(np.radians(75.0)), np.sin(np.radians(75.0))
+    flat = pattern.vertices_coords @ np.array([[c, s], [-s, c]])
+    turned = replace(pattern, vertices_coords=flat)
+    mf.sheets(turned, marks="none", seam_columns=(2,), rotations=(180,)).write(tmp_path / "job")
+    layout = json.loads((tmp_path / "job" / "layout.json").read_text())
+    assert {abs(each["rotation_deg"]) for each in layout["absent_labels"]} == {180.0}
+    assert refused(mf.check_job(tmp_path / "job")) == []
+    layout["absent_labels"][0]["rotation_deg"] -= 360.001
+    (tmp_path / "job" / "layout.json").write_text(json.dumps(layout))
+    seal(tmp_path / "job")
+    assert refused(mf.check_job(tmp_path / "job")) == [
+        "layout: The labels that the layout calls absent are not those without room."
+    ]
