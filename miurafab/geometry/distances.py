@@ -66,10 +66,10 @@ class MeshTrees:
 
     @classmethod
     def of(cls, triangles: Floats) -> MeshTrees:
-        """The trees of ``triangles`` (m, 3, 3)."""
+        """The trees of ``triangles`` (m, 3, 3), of which there is one at least."""
         centres = (triangles.min(axis=1) + triangles.max(axis=1)) / 2
         radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
-        largest = radii.max(initial=0.0)
+        largest = radii.max() or 1.0
         halvings = np.floor(np.log2(largest / np.maximum(radii, 1e-6 * largest)))
         members = [np.flatnonzero(halvings == size) for size in np.unique(halvings)]
         return cls(triangles, tuple(_SizeClass(m, tree_of(centres[m]), radii[m]) for m in members))

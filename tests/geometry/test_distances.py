@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -32,6 +33,14 @@ def test_the_two_triangles_of_a_square_share_their_centre(seed, side):
     random = np.random.default_rng(seed)
     points = random.uniform([-1, -1, -1], [side + 1, side + 1, 1], (30, 3))
     assert_nearest(points, triangles)
+
+
+def test_triangles_that_are_points_are_near_and_no_triangles_are_not() -> None:
+    """Both told that each point lies on the mesh."""
+    points = np.array([[3.0, 4.0, 0.0], [0.0, 0.0, 1.0]])
+    assert_nearest(points, np.zeros((3, 3, 3)))
+    with pytest.raises(ValueError, match="zero-size"):
+        MeshTrees.of(np.zeros((0, 3, 3)))
 
 
 def assert_nearest(points, triangles):
