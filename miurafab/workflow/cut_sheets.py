@@ -18,7 +18,7 @@ from miurafab.files import AnyPath
 from miurafab.findings import Finding
 from miurafab.machine.job_process import session_apart
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import Head, JobPlan, head_at, plan_job, put_in
+from miurafab.machine.planning import Head, JobPlan, feeds_itself, head_at, plan_job, put_in
 from miurafab.machine.sender import SheetSession, StreamResult, session_here
 from miurafab.machine.trace_box import frame_job
 from miurafab.machine.transport import VIRTUAL, require_port
@@ -217,14 +217,16 @@ def cut_prepared(
     with _session(prepared, port, options, keys) as session:
         for number, plan in plans:
             further = bool(done) or (options.resume and plan.resumption is None)
-            if further and waits:
+            before = done[-1].name if done else prepared.jobs[number - 2].name
+            name = prepared.jobs[number - 1].name
+            fed = pause is None and feeds_itself(prepared.machine, before, name)
+            if further and waits and not fed:
                 if before_sheet is not None:
                     with session.waits():
                         before_sheet(number, len(prepared.jobs))
                 elif done:
-                    name = prepared.jobs[number - 1].name
                     raise PersonNeeded(
-                        f"Before {name}, {put_in(done[-1].name, name)}; nobody is here to do so. "
+                        f"Before {name}, {put_in(before, name)}; nobody is here to do so. "
                         f"Then go on with `sheet` {number}. Done: "
                         f"{', '.join(sheet.name for sheet in done)}."
                     )

@@ -14,7 +14,7 @@ from miurafab.machine.journal import read_journal
 from miurafab.machine.keys import NoKeys
 from miurafab.machine.planning import SendOptions
 from miurafab.machine.sender import session_here
-from miurafab.workflow import multi_machine
+from miurafab.workflow import cut_sheets, multi_machine
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import cut_prepared
@@ -78,6 +78,25 @@ def test_a_sheet_that_is_worked_from_both_sides_is_turned_over_in_between(both_s
         cut_prepared(both_sides, port="virtual", pause=True)
     with pytest.raises(PersonNeeded, match=r"Before sheet-02\.nc, put in fresh material"):
         cut_prepared(both_sides, port="virtual", sheets=[2, 3], pause=True)
+
+
+def test_a_machine_that_feeds_itself_asks_for_the_other_side_alone(both_sides, monkeypatch):
+    def apart(machine, port, name, *, keys, virtual_speed):
+        return session_here(machine, "virtual", name, keys=keys)
+
+    monkeypatch.setattr(cut_sheets, "session_apart", apart)
+    bed = dataclasses.replace(both_sides.machine.bed, roll_fed=True)
+    machine = dataclasses.replace(both_sides.machine, bed=bed)
+    fed = dataclasses.replace(both_sides, machine=machine)
+    for pause, wanted in ((None, [2]), (True, [2, 3])):
+        asked = []
+        cut_prepared(
+            fed,
+            port="/dev/ttyUSB0",
+            pause=pause,
+            before_sheet=lambda number, _, asked=asked: asked.append(number),
+        )
+        assert asked == wanted
 
 
 def test_the_two_sides_of_a_sheet_are_not_shared_out(both_sides, job):
