@@ -75,12 +75,14 @@ def fit(
         raise OptionError(
             "size", "is bed, which only `fit` and `cut` know, with a machine; give mm"
         )
+    started = time.perf_counter()
     result = _fitted(request, on_progress, _FitSearch)
     if request.barrier is None:
         return result
     from miurafab.origami.energy.tuning import tuned
 
-    return tuned(request, result, lambda other: _fitted(other, None, _SheetAlone), on_progress)
+    result = tuned(request, result, lambda other: _fitted(other, None, _SheetAlone), on_progress)
+    return replace(result, seconds=time.perf_counter() - started)
 
 
 def _fitted(

@@ -1,5 +1,6 @@
 """A fit with the barrier that is asked for."""
 
+import time
 from dataclasses import replace
 from functools import cache
 
@@ -44,7 +45,10 @@ def test_the_distances_of_the_first_sheet_and_the_answer_are_measured(monkeypatc
     monkeypatch.setattr(
         "miurafab.origami.verify.coverage", lambda *of: measured.append(of) or cover(*of)
     )
+    started = time.perf_counter()
     result = fit("hypar", facets=(6, 6), size=120, barrier=1e-6)
+    took = time.perf_counter() - started
+    assert 0.8 * took < result.seconds < took  # the first sheet takes a tenth
     assert len(measured) == 2
     assert result.measurements.coverage > 0.9
     assert_barrier(result, 1e-6, tmp_path)
