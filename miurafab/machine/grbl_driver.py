@@ -144,7 +144,7 @@ class GrblDriver(StreamDriver):
                     )
                     if asked_last and event.state in ("Idle", "Check"):
                         return
-                    if event.state in ("Hold", "Door"):
+                    if event.state != "Idle":  # a dwell is answered after the moves before it
                         answered = session.now()
                     self._watch_for_loss(event, answered)
             if not events and session.now() - session.heard > ANSWER_S:

@@ -477,6 +477,14 @@ def test_a_hold_at_the_machine_is_no_pause_before_or_after_one_of_the_program(at
     assert burnt(wire) == pytest.approx(30, abs=0.2)
 
 
+def test_a_dwell_after_slow_moves_is_no_line_that_was_lost() -> None:
+    """GRBL says nothing while the moves before it end, and then is idle for as long as it lasts."""
+    job = Job("slow.nc", "M4 S0\nG1 X20 S500 F120\nG4 P0.5\nG1 X30 F3000\nM5\n")
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=MACHINE.controller.baud))
+    assert deliver(plan_job(job, MACHINE), wire, StopSignals()).seconds > 10
+    assert burnt(wire) == pytest.approx(30, abs=0.2)
+
+
 @pytest.mark.parametrize("busy_s", [4.0, 9.0])
 def test_a_program_that_is_slow_to_show_progress_is_no_silence_of_the_controller(
     busy_s: float,
