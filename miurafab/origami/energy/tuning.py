@@ -14,6 +14,7 @@ themselves, or break a limit), the answer says how far they go.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -28,7 +29,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.request import FitRequest
-from miurafab.origami.fitting.result import INTERRUPTED, FitResult
+from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, FitResult
 from miurafab.origami.fitting.scaling import scaled_residuals, worst_residual
 from miurafab.origami.nearness import means_to_target
 from miurafab.origami.verify import (
@@ -68,11 +69,13 @@ def tuned(
     result: FitResult,
     fit: Callable[[FitRequest], FitResult],
     on_progress: Callable[[float, str], None] | None = None,
+    ends_at: float = math.inf,
 ) -> FitResult:
     """``result`` brought to the barrier of ``request``, in k_f L; or ``infeasible``, with the
     nearest sheet and how far the barrier goes. ``fit`` makes the sheet of another request, whose
     distances are not asked for. Ctrl-C ends the search: the result is the nearest sheet up to then,
-    ``interrupted``.
+    ``interrupted``. So does the clock (``time.perf_counter``) at ``ends_at``: that sheet is
+    ``infeasible`` unless it has the barrier.
 
     Raises :class:`~miurafab.errors.OptionError` for a sheet that is not one full grid.
     """
@@ -91,7 +94,14 @@ def tuned(
         return _missed(result, "The sheet folds rigidly, so it has no barrier to change.")
     found: list[Tried] = []
 
+    def left() -> float:
+        seconds = ends_at - time.perf_counter()
+        if seconds <= 0:
+            raise TimeoutError
+        return seconds
+
     def at(family: str, fitted: CreasePattern, factor: float) -> Tried | None:
+        left()
         sheet = _tried(request, fitted, factor)
         if sheet is not None:
             found.append(sheet)
@@ -100,20 +110,25 @@ def tuned(
             on_progress(1 - 0.9 ** len(found), f"{family}, residuals times {factor:.3g}: {said}")
         return sheet
 
-    interrupted = False
+    ended: Finding | None = None
     try:
         _search(asked, partial(at, "the fit", pattern))
         for family, other in _families(request, worst):
-            fitted = fit(other)
+            seconds = left()
+            fitted = fit(replace(other, timeout=seconds) if math.isfinite(seconds) else other)
             if fitted.status == "interrupted":
                 raise KeyboardInterrupt
             sheet = fitted.pattern if fitted.is_valid else None
             if sheet is not None and sheet.grid is not None and worst_residual(sheet) > EXACT:
                 _search(asked, partial(at, family, sheet))
     except KeyboardInterrupt:
-        interrupted = True
+        ended = INTERRUPTED
         if not found:
             raise
+    except TimeoutError:
+        ended = TIME_RAN_OUT
+    if not found and ended is not None:
+        return _ended(result, ended, "infeasible")
     if not found:
         return _missed(result, "The way to flat of the fitted sheet was lost.")
     held = [sheet for sheet in found if _miss(sheet, asked) <= CLOSE]
@@ -131,9 +146,8 @@ def tuned(
     )
     if _miss(best, asked) <= CLOSE:
         return answer
-    if interrupted:
-        findings = (*result.findings, INTERRUPTED)
-        return replace(answer, status="interrupted", advice=INTERRUPTED.sentence, findings=findings)
+    if ended is not None:
+        return _ended(answer, ended, "interrupted" if ended is INTERRUPTED else "infeasible")
     low = min(found, key=lambda sheet: sheet.barrier)
     high = max(found, key=lambda sheet: sheet.barrier)
     return _missed(
@@ -234,6 +248,11 @@ def _tried(request: FitRequest, fitted: CreasePattern, factor: float) -> Tried |
     except PatternError:  # no balance is found at its folded form
         return None
     return Tried(factor, pattern, measured, curve.barrier) if curve.converged else None
+
+
+def _ended(result: FitResult, why: Finding, status: str) -> FitResult:
+    findings = (*(each for each in result.findings if each != why), why)
+    return replace(result, status=status, advice=why.sentence, findings=findings)
 
 
 def _missed(result: FitResult, sentence: str) -> FitResult:

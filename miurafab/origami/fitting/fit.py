@@ -81,7 +81,12 @@ def fit(
         return result
     from miurafab.origami.energy.tuning import tuned
 
-    result = tuned(request, result, lambda other: _fitted(other, None, _SheetAlone), on_progress)
+    ends_at = math.inf if request.timeout is None else started + request.timeout
+
+    def alone(other: FitRequest) -> FitResult:
+        return _fitted(other, None, _SheetAlone)
+
+    result = tuned(request, result, alone, on_progress, ends_at)
     return replace(result, seconds=time.perf_counter() - started)
 
 

@@ -3,6 +3,7 @@
 import time
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from miurafab.origami import coverage
 from miurafab.origami.energy import tuning
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.fitting.fit import fit as fit_sheet
+from miurafab.origami.fitting.result import TIME_RAN_OUT
 from miurafab.origami.fitting.scaling import with_residual, worst_residual
 from miurafab.origami.formats.files import load
 from miurafab.origami.verify import measure
@@ -124,6 +126,32 @@ def test_an_interruption_gives_the_nearest_sheet_up_to_then():
     assert (result.status, result.is_valid) == ("interrupted", True)
     assert result.barrier == pytest.approx(energy_curve(result.pattern, 24).barrier)
     assert "interrupted" in result.advice
+
+
+@pytest.mark.parametrize("sheets", [0, 2])
+def test_time_ends_the_search_too(sheets, monkeypatch):
+    """Sheets that a fit makes on the way have the time that is left."""
+    request = design("hypar", facets=(6, 6), size=120, barrier=1.0).request
+    clock = iter(range(100))
+    monkeypatch.setattr(tuning, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    result = tuning.tuned(request, sheet("hypar"), pytest.fail, ends_at=sheets - 0.5)
+    assert (result.status, result.advice) == ("infeasible", TIME_RAN_OUT.sentence)
+    assert result.findings.count(TIME_RAN_OUT) == 1
+    assert next(clock) == sheets + 1
+    if sheets:
+        assert result.barrier == pytest.approx(energy_curve(result.pattern, 24).barrier)
+    else:
+        assert result.pattern is sheet("hypar").pattern
+    monkeypatch.setattr(tuning, "_search", lambda *_: None)
+    given = []
+
+    def fitted(other):
+        given.append(other.timeout)
+        return sheet("hypar")
+
+    clock = iter(range(100))
+    tuning.tuned(request, sheet("hypar"), fitted, ends_at=2.5)
+    assert given == [2.5, 1.5, 0.5]
 
 
 @cache
