@@ -207,7 +207,8 @@ def proved(
     claims = [
         (
             {"double-edge", "facets", "turned-over", "bow-tie", "degenerate-edge"},
-            f"The {facets} facets fit the {edges} edges"
+            f"The {counted(facets, 'facet fits', 'facets fit')}"
+            + f" the {edges} edges"
             + (" and the lattice." if lattice else "."),
         ),
         ({"assignment"}, f"The letters of {edges} edges agree with their facets and fold angles."),

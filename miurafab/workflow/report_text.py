@@ -54,7 +54,8 @@ def pattern_lines(report: Mapping[str, Any], *, whole: bool = False) -> list[dic
         vertices = report.get("vertices") or 0
         lines.append(ReportLine("Facets", f"{report['facets']:,}", f"{vertices:,} vertices"))
     if (report.get("pieces") or 1) > 1:
-        seams = f"{length_text(report['seam_mm'])} of seams"
+        seam = report.get("seam_mm") or 0.0
+        seams = f"{length_text(seam)} of seams" if seam else "without seams"
         lines.append(ReportLine("Pieces", f"{report['pieces']:,}", seams))
     if whole:
         lines += _quality(report)

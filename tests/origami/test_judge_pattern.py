@@ -102,6 +102,14 @@ def test_a_whole_sheet_is_proved_sentence_by_sentence() -> None:
     columns, rows = np.meshgrid(np.arange(8), np.arange(6))
     celled = replace(loose, cells=np.column_stack([columns.ravel(), rows.ravel()]))
     assert audit(celled).proved[0] == facets[0]
+    square = CreasePattern(
+        np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]),
+        np.array([[0, 1], [1, 2], [2, 3], [0, 3]]),
+        np.array(["B"] * 4),
+        np.zeros(4),
+        np.array([[0, 1, 2, 3]]),
+    )
+    assert audit(square).proved[0] == "The 1 facet fits the 4 edges."
     flat = audit(replace(regular(), folded_coords=None))
     assert flat.proved == tuple(facets)
     assert flat.findings == (Finding("not-proven", WITHOUT_FORM),)

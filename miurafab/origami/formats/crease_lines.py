@@ -29,7 +29,7 @@ class CreaseLines:
     float64, radians, NaN if unknown. ``curve`` (n,) int64 is the number of the curved line that a
     line is a part of, -1 for none, and None where all lines are straight; they lie within
     ``curve_tolerance`` of it, mm. ``left_out`` tells how many elements of which kinds the reader
-    passed over, though they may hold lines.
+    passed over, though they may hold lines. The last ``added`` lines are not of the drawing.
     """
 
     ends: Floats
@@ -38,6 +38,7 @@ class CreaseLines:
     curve: Ints | None = None
     curve_tolerance: float = 0.0
     left_out: Mapping[str, int] = field(default_factory=dict)
+    added: int = 0
 
     @property
     def curves(self) -> int:
@@ -112,6 +113,7 @@ def with_flat_lines(lines: CreaseLines, ends: Floats) -> CreaseLines:
         assignment=np.concatenate([lines.assignment, np.full(count, "F")]),
         fold_angle=np.concatenate([lines.fold_angle, np.zeros(count)]),
         curve=None if curve is None else np.concatenate([curve, np.full(count, -1)]),
+        added=lines.added + count,
     )
 
 

@@ -98,7 +98,7 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
         with_rulings = with_flat_lines(lines, bent + drawn.origin)
         ruled = _joined(with_rulings, split_lines(with_rulings, near)).pattern
         told += (told_of_rulings(len(bent)),)
-        drawn = replace(drawn, pattern=replace(ruled, told=drawn.pattern.told))
+        drawn = replace(drawn, pattern=ruled)
     return replace(drawn.pattern, told=drawn.pattern.told + told)
 
 

@@ -79,19 +79,28 @@ def _told(
 
 
 def lost_lines(lines: CreaseLines, source: Ints, stands_for: Ints) -> Bools:
-    """(n,) the ``lines`` of which nothing is in the pattern; those without length do not count."""
+    """(n,) the ``lines`` of the drawing of which nothing is in the pattern; those without length do
+    not count.
+    """
     away = np.asarray((lines.ends[:, 0] != lines.ends[:, 1]).any(axis=1))
     away[source[stands_for >= 0]] = False
-    return away
+    return away & _of_drawing(lines)
 
 
 def torn_lines(lines: CreaseLines, source: Ints, stands_for: Ints, lengths: Floats) -> Bools:
-    """(n,) the ``lines`` of which a part is in the pattern and more than an overshoot is not."""
+    """(n,) the ``lines`` of the drawing of which a part is in the pattern, and more than an
+    overshoot is not.
+    """
     whole, left = (
         np.bincount(source, lengths * part, minlength=len(lines.ends))
         for part in (1.0, stands_for < 0)
     )
-    return np.asarray((left > _OVERSHOOT * whole) & ~lost_lines(lines, source, stands_for))
+    torn = (left > _OVERSHOOT * whole) & ~lost_lines(lines, source, stands_for)
+    return np.asarray(torn & _of_drawing(lines))
+
+
+def _of_drawing(lines: CreaseLines) -> Bools:
+    return np.arange(len(lines.ends)) < len(lines.ends) - lines.added
 
 
 def told_of_joining(near: float) -> Finding:

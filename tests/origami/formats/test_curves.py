@@ -363,3 +363,28 @@ def test_curves_that_nearly_meet_leave_no_edges_finer_than_their_tolerance_tells
     ends = pattern.vertices_coords[pattern.edges_vertices]
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min() > 0.075
     assert "joined-ends" in [finding.code for finding in pattern.told]
+
+
+@pytest.mark.parametrize(
+    ("curve", "valley"),
+    [
+        ('<path d="M0 70 A80 80 0 0 1 70 100" stroke="red"/>', "M80 0V60"),
+        ('<circle cx="20" cy="20" r="10" stroke="red"/>', "M50 0V60"),
+    ],
+)
+def test_what_a_crease_lost_is_what_the_finished_pattern_lacks_of_it(curve, valley) -> None:
+    """Rulings complete a crease that ends within a facet, as far as they meet it."""
+    pattern = pattern_from_lines(
+        parse_svg(
+            '<svg><g fill="none"><rect width="100" height="100" stroke="#000"/>'
+            f'<path d="{valley}" stroke="blue"/>{curve}</g></svg>'
+        )
+    )
+    lengths = np.linalg.norm(
+        np.diff(pattern.vertices_coords[pattern.edges_vertices], axis=1)[:, 0], axis=1
+    )
+    missing = 60 - lengths[pattern.edges_assignment == "V"].sum()
+    assert 1 < missing < 30
+    (lost,) = [each.sentence for each in pattern.told if each.code == "lost-lines"]
+    assert "1 line of the drawing is left out in part" in lost
+    assert f"by up to {missing:.3g} mm" in lost
