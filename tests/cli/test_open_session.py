@@ -132,7 +132,7 @@ def test_a_sheet_is_chosen_framed_and_burnt_by_words(words):
     """The port by its option, and so the job by its place alone."""
     done = words("sheet 1\nfresh\nframe\nstart\n", "line.nc", "--port", "virtual")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "Fresh material is in." in done.stdout
+    assert "The sheet is in." in done.stdout
     assert "The frame was traced." in done.stdout
     assert "line.nc is done: 5 lines in 0:0" in done.stdout
     burnt = InThread.made.device.beam_log
