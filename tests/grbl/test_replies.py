@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 from hypothesis import given, settings
@@ -56,6 +56,7 @@ FULL = StatusReport(
         ("Grbl 3.7 [FluidNC v3.7.4 (wifi) '$' for help]", Banner("Grbl", "3.7")),
         ("[MSG:Caution: Unlocked]", Feedback("Caution: Unlocked")),
         ("[VER:1.1h.20190830:my laser]", Version("1.1h.20190830", "my laser")),
+        ("[VER:1.1h.20190830:beam: 5 W]", Version("1.1h.20190830", "beam: 5 W")),
         ("[OPT:V,15,128]", Options("V", 15, 128)),
         ("[OPT:VL]", Options("VL", None, None)),
         ("[OPT:VNMSL,35,1024,3,0]", Options("VNMSL", 35, 1024)),
@@ -83,6 +84,7 @@ FULL = StatusReport(
             StatusReport("Run", machine_position=(1.0, 0.0, 0.0), work_position=(0.0, 0.0, 0.0)),
         ),
         ("<Idle|MPos:1,2|F:300|New:1>", StatusReport("Idle", machine_position=(1, 2), feed=300)),
+        ("<Idle|MPos:1,2|Pn:X:Y>", StatusReport("Idle", machine_position=(1, 2), pins="X:Y")),
     ],
 )
 def test_each_form(text: str, event: Event) -> None:
@@ -149,6 +151,14 @@ def test_the_beam_is_on_or_off_only_where_that_is_said(fields: str, on: bool, of
     report = parse_reply(f"<Idle|MPos:0,0,0|{fields}>")
     assert isinstance(report, StatusReport)
     assert (report.beam_on, report.beam_off) == (on, off)
+
+
+def test_a_field_that_a_report_has_not_is_none() -> None:
+    report = parse_reply("<Idle|New:1>")
+    assert isinstance(report, StatusReport)
+    values = asdict(report)
+    assert values.pop("state") == "Idle"
+    assert set(values.values()) == {None}
 
 
 def test_a_report_in_inches_is_scaled_in_its_positions_alone() -> None:
