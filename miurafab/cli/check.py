@@ -39,8 +39,6 @@ def check(
     to a crease, tab fold, outline, hole or label of the pattern. Exits with 1 if something does not
     hold.
     """
-    from miurafab.cli.pattern_report import show_pattern
-
     if thing.is_dir():
         return _check_job(thing, rebuild, console)
     if rebuild:
@@ -49,6 +47,8 @@ def check(
     report = result.report()
 
     def show() -> None:
+        from miurafab.cli.pattern_report import show_pattern
+
         show_pattern(console, report, opened=True)
         for sentence in result.proved:
             console.line(f"Proved: {sentence}")

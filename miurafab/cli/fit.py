@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import miurafab
 from miurafab.cli.console import Console
@@ -67,8 +67,6 @@ def fit(
     nearest sheet is written to NAME.rejected.fold. Ctrl-C ends the search: the best sheet up to
     then is written. With --size bed the shell is as large as the sheets of the machine allow.
     """
-    from miurafab.cli.pattern_report import show_pattern
-
     if out.suffix.lower() != ".fold":
         raise OptionError("out", f"is {out}; a fit writes a FOLD file, whose name ends in .fold")
     new_file(out, "The pattern file", (".fold",))
@@ -89,7 +87,7 @@ def fit(
         answer["file"] = str(file)
     if report is not None:
         write_text(report, json_text(answer) + "\n")
-    console.answer(answer, lambda: show_pattern(console, answer))
+    console.answer(answer, lambda: _show(console, answer))
     for finding in result.findings:
         if finding not in asked.findings and finding.sentence not in result.advice:
             console.note(finding.sentence)
@@ -99,3 +97,9 @@ def fit(
         console.note(f"Interrupted: {out} is the best sheet up to then.")
         return INTERRUPTED
     return DONE if result.status == "converged" else NO
+
+
+def _show(console: Console, answer: dict[str, Any]) -> None:
+    from miurafab.cli.pattern_report import show_pattern  # no fit that fails at once waits for it
+
+    show_pattern(console, answer)

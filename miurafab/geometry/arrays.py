@@ -19,6 +19,18 @@ def run_starts(counts: Ints) -> Ints:
     return np.cumsum(counts) - counts
 
 
+def group_means(points: Floats | Ints, group: Ints) -> Floats:
+    """(g, d) the mean of the ``points`` (n, d) of each ``group`` (n,), numbered from 0."""
+    sums = [np.bincount(group, points[:, axis]) for axis in range(points.shape[1])]
+    return np.stack(sums, axis=1) / np.bincount(group)[:, None]
+
+
+def nearest_to_means(points: Floats | Ints, group: Ints) -> Ints:
+    """(g,) of each ``group`` (n,) the first of its ``points`` (n, d) nearest to their mean."""
+    away = np.linalg.norm(points - group_means(points, group)[group], axis=1)
+    return np.lexsort((away, group))[run_starts(np.bincount(group))]
+
+
 def places_in_runs(counts: Ints) -> Ints:
     """(sum of counts,) the place of each item in its own run: 0, 1, 0, 1, 2 for counts 2, 0, 3."""
     return np.arange(counts.sum()) - np.repeat(run_starts(counts), counts)

@@ -6,9 +6,11 @@ is called, because a job that is only read has no use for it.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from miurafab.geometry.arrays import Bools, Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints, places_among
 
 
 def components(count: int, one: Ints, other: Ints) -> Ints:
@@ -36,10 +38,21 @@ def components(count: int, one: Ints, other: Ints) -> Ints:
     return connected_components(links, directed=False)[1].astype(np.int64)
 
 
-def shortest_ways(
-    count: int, one: Ints, other: Ints, lengths: Floats, starts: Ints
-) -> tuple[Floats, Ints]:
-    """How far each node is from the nearest of some others, and the node before it on that way.
+class Ways(NamedTuple):
+    """The shortest ways to the nodes of a graph: how long each is, and its last link.
+
+    ``distance`` (count,) is 0 where the ways start and inf where none leads. ``before`` (count,) is
+    the node before, and ``link`` (count,) the link from there; both are below 0 where there is
+    none.
+    """
+
+    distance: Floats
+    before: Ints
+    link: Ints
+
+
+def shortest_ways(count: int, one: Ints, other: Ints, lengths: Floats, starts: Ints) -> Ways:
+    """The shortest way to each node from the nearest of some others.
 
     Parameters
     ----------
@@ -48,16 +61,10 @@ def shortest_ways(
     one, other : (n,) array of int
         The two nodes of each link.
     lengths : (n,) array of float
-        The length of each link, over 0. Of several links between two nodes the shortest counts.
+        The length of each link, over 0. Of several links between two nodes the shortest counts,
+        and the first of equals.
     starts : (k,) array of int
         The nodes from which the ways lead.
-
-    Returns
-    -------
-    distance : (count,) array of float
-        0 at ``starts``, inf where no way leads.
-    before : (count,) array of int
-        Below 0 at ``starts`` and where no way leads.
 
     Source: E. W. Dijkstra, *A note on two problems in connexion with graphs* (1959), as in
     ``scipy.sparse.csgraph``.
@@ -66,13 +73,22 @@ def shortest_ways(
     from scipy.sparse.csgraph import dijkstra
 
     order = np.argsort(lengths, kind="stable")
-    ends = np.sort(np.stack([one, other], axis=1)[order], axis=1)
-    _, first = np.unique(ends, axis=0, return_index=True)
-    links = coo_array((lengths[order][first], ends[first].T), shape=(count, count)).tocsr()
-    distance, before, _ = dijkstra(
+    keys, first = np.unique(_keys(count, one, other)[order], return_index=True)
+    kept = order[first]
+    links = coo_array((lengths[kept], (one[kept], other[kept])), shape=(count, count)).tocsr()
+    distance, last, _ = dijkstra(
         links, directed=False, indices=starts, return_predecessors=True, min_only=True
     )
-    return distance.reshape(count), before.reshape(count).astype(np.int64)
+    before: Ints = last.reshape(count).astype(np.int64)
+    led = np.flatnonzero(before >= 0)
+    link = np.full(count, -1, dtype=np.int64)
+    link[led] = kept[places_among(keys, _keys(count, led, before[led]))]
+    return Ways(distance.reshape(count), before, link)
+
+
+def _keys(count: int, one: Ints, other: Ints) -> Ints:
+    """(n,) a number for the two nodes of each link, whichever is first."""
+    return np.minimum(one, other).astype(np.int64) * count + np.maximum(one, other)
 
 
 def minimum_cut(

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.geometry.angles import angle_between
-from miurafab.geometry.arrays import Bools, Floats, Ints, run_starts
+from miurafab.geometry.arrays import Bools, Floats, Ints, nearest_to_means
 from miurafab.geometry.connected import components, shortest_ways
 from miurafab.geometry.evening import evened
 from miurafab.geometry.polygons import reflex_corners
@@ -143,33 +143,19 @@ def _tree(charts: QuadCharts, creases: Ints) -> _Tree:
     part = components(count, *facets.T)
     _, piece = np.unique(np.stack([charts.pieces, part], axis=1), axis=0, return_inverse=True)
     pieces = piece.reshape(count).astype(np.int64)
-    roots = _middles(charts.cells, pieces)
+    roots = nearest_to_means(charts.cells, pieces)
     middles = (2 * charts.cells[:, None, :] + _MIDDLES).reshape(-1, 2)
     closing = (middles[creases[:, 0]] != middles[creases[:, 1]]).any(axis=1)
-    pairs = np.sort(facets, axis=1)
     weight = np.where(closing, float(count), 1.0)
-    distance, before = shortest_ways(count, pairs[:, 0], pairs[:, 1], weight, roots)
+    distance, before, link = shortest_ways(count, facets[:, 0], facets[:, 1], weight, roots)
     child = np.flatnonzero(distance > 0)
     child = child[np.argsort(distance[child], kind="stable")]
-    parent = before[child]
-    key = pairs[:, 0] * count + pairs[:, 1]
-    order = np.argsort(key)
-    wanted = np.minimum(parent, child) * count + np.maximum(parent, child)
-    link = order[np.searchsorted(key, wanted, sorter=order)]
     used = np.zeros(len(creases), dtype=bool)
-    used[link] = True
-    own = creases[link]
-    sides = np.where((own[:, :1] // 4 == parent[:, None]), own, own[:, ::-1])
+    used[link[child]] = True
+    own = creases[link[child]]
+    sides = np.where((own[:, :1] // 4 == before[child, None]), own, own[:, ::-1])
     levels = np.flatnonzero(np.diff(distance[child]) > 0) + 1
     return _Tree(pieces, roots, used, tuple(np.split(sides, levels)) if len(sides) else ())
-
-
-def _middles(cells: Ints, pieces: Ints) -> Ints:
-    """The facet of each piece whose cell is nearest to the mean of its cells."""
-    size = np.bincount(pieces)
-    mean = np.stack([np.bincount(pieces, cells[:, axis]) / size for axis in (0, 1)], axis=1)
-    away = np.linalg.norm(cells - mean[pieces], axis=1)
-    return np.lexsort((away, pieces))[run_starts(size)]
 
 
 def _cut(charts: QuadCharts, creases: Ints, used: Bools) -> Bools:

@@ -19,7 +19,7 @@ import numpy as np
 
 from miurafab.errors import PatternError
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Bools, Floats, Ints, run_starts, vector_product
+from miurafab.geometry.arrays import Bools, Floats, Ints, nearest_to_means, vector_product
 from miurafab.geometry.connected import components, shortest_ways
 from miurafab.geometry.evening import evened
 from miurafab.geometry.polygons import (
@@ -178,21 +178,15 @@ def _laid(pattern: CreasePattern) -> tuple[Floats, Bools]:
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     pair = pattern.edges_faces[inner]
     count = len(faces)
-    # two facets with several edges in common are joined by one of them
-    joint = {(int(a), int(b)): int(e) for e, (a, b) in zip(inner, pair, strict=True)}
-    joint |= {(b, a): e for (a, b), e in joint.items()}
     corners = _in_their_planes(points, faces)
     used = np.zeros(len(pattern.edges_vertices), dtype=bool)
     part = components(count, *pair.T)
-    size = np.bincount(part)[:, None]
-    middle = points[filled(faces)].mean(axis=1)
-    mean = np.stack([np.bincount(part, middle[:, axis]) for axis in range(3)], axis=1) / size
-    away = np.linalg.norm(middle - mean[part], axis=1)
-    roots = np.lexsort((away, part))[run_starts(size[:, 0])]
-    hops, before = shortest_ways(count, pair[:, 0], pair[:, 1], np.ones(len(pair)), roots)
+    roots = nearest_to_means(points[filled(faces)].mean(axis=1), part)
+    # two facets with several edges in common are joined by the first of them
+    hops, before, link = shortest_ways(count, pair[:, 0], pair[:, 1], np.ones(len(pair)), roots)
     for facet in np.argsort(hops, kind="stable")[len(roots) :].tolist():
         parent = int(before[facet])
-        edge = joint[parent, facet]
+        edge = int(inner[link[facet]])
         used[edge] = True
         ends = pattern.edges_vertices[edge]
         goal = np.array([corners[parent][np.argmax(faces[parent] == v)] for v in ends])

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Ints, group_means
 from miurafab.geometry.connected import components
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -39,24 +39,17 @@ def welded(pattern: CreasePattern, tolerance: float) -> CreasePattern:
     folded = pattern.folded_coords
     return replace(
         pattern,
-        vertices_coords=_middles(pattern.vertices_coords, number),
+        vertices_coords=group_means(pattern.vertices_coords, number),
         edges_vertices=number[pattern.edges_vertices[kept]],
         edges_assignment=pattern.edges_assignment[kept],
         edges_fold_angle=pattern.edges_fold_angle[kept],
         faces_vertices=_padded([corners for corners in faces if len(corners) > 2]),
-        folded_coords=None if folded is None else _middles(folded, number),
+        folded_coords=None if folded is None else group_means(folded, number),
         grid=None,
         pieces=None if pattern.pieces is None else pattern.pieces[whole],
         seams=None if seams is None else seams[(seams >= 0).all(axis=1)],
         cells=None,
     )
-
-
-def _middles(points: Floats, number: Ints) -> Floats:
-    """The mean of the ``points`` (V, k) of each ``number`` (V,)."""
-    sums = np.zeros((int(number.max()) + 1, points.shape[1]))
-    np.add.at(sums, number, points)
-    return np.asarray(sums / np.bincount(number)[:, None])
 
 
 def _corners(corners: Ints) -> Ints:

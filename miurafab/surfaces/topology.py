@@ -137,16 +137,10 @@ def _oriented(faces: Ints, name: str) -> Ints:
         return faces
     count = len(faces)
     f, g = first // 3, second // 3
-    hops, before = shortest_ways(count, f, g, np.ones(len(f)), np.array([0]))
-    order = np.argsort(hops, kind="stable")[: np.isfinite(hops).sum()]
-    key = np.minimum(f, g) * count + np.maximum(f, g)
-    sorting = np.argsort(key)
-    way = np.minimum(order[1:], before[order[1:]]) * count + np.maximum(
-        order[1:], before[order[1:]]
-    )
-    same = agree[sorting[np.searchsorted(key, way, sorter=sorting)]]
+    hops, before, link = shortest_ways(count, f, g, np.ones(len(f)), np.array([0]))
+    order = np.argsort(hops, kind="stable")[1 : np.isfinite(hops).sum()]
     turned = np.zeros(count, dtype=bool)
-    for triangle, keeps in zip(order[1:].tolist(), same.tolist(), strict=True):
+    for triangle, keeps in zip(order.tolist(), agree[link[order]].tolist(), strict=True):
         turned[triangle] = turned[before[triangle]] != (not keeps)
     # most triangles keep their side
     if turned.sum() * 2 > count:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from miurafab.geometry.arrays import vector_product
+from miurafab.geometry.arrays import group_means, nearest_to_means, vector_product
 
 
 @pytest.mark.parametrize(
@@ -16,3 +16,10 @@ def test_the_vector_product_is_that_of_numpy(one, other):
     product, expected = vector_product(a, b), np.cross(a, b)
     assert product.shape == expected.shape
     assert (product == expected).all()
+
+
+def test_the_point_of_each_group_nearest_to_its_mean_is_the_first_of_equals():
+    points = np.array([[0.0, 0.0], [4.0, 0.0], [2.0, 1.0], [2.0, -1.0], [7.0, 7.0]])
+    group = np.array([0, 0, 0, 0, 1])
+    assert group_means(points, group).tolist() == [[2.0, 0.0], [7.0, 7.0]]
+    assert nearest_to_means(points, group).tolist() == [2, 4]

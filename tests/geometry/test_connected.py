@@ -50,16 +50,18 @@ def test_a_way_is_shortest_and_leads_from_node_to_node(case, data):
     count, links = case
     starts = np.array(sorted(data.draw(st.sets(st.integers(0, count - 1), min_size=1))))
     one, other, length = _arrays(links)
-    distance, before = shortest_ways(count, one, other, length.astype(float), starts)
+    distance, before, link = shortest_ways(count, one, other, length.astype(float), starts)
     expected = _distances(count, links)[starts].min(axis=0)
     np.testing.assert_array_equal(distance, expected)
     led = np.setdiff1d(np.flatnonzero(np.isfinite(expected)), starts)
     assert (before[np.setdiff1d(np.arange(count), led)] < 0).all()
-    steps = {(a, b): n for a, b, n in sorted(links, key=lambda link: -link[2])}
-    steps |= {(b, a): min(n, steps.get((b, a), n)) for (a, b), n in steps.items()}
+    assert ((link >= 0) == np.isin(np.arange(count), led)).all()
     for node in led.tolist():
-        step = min(steps.get((node, int(before[node])), np.inf), steps[int(before[node]), node])
-        assert distance[node] == distance[before[node]] + step
+        last = int(link[node])
+        assert {int(one[last]), int(other[last])} == {node, int(before[node])}
+        assert distance[node] == distance[before[node]] + length[last]
+        parallel = [n for n, (a, b, _) in enumerate(links) if {a, b} == {node, int(before[node])}]
+        assert last == min(parallel, key=lambda n: links[n][2])
 
 
 @given(LINKS.filter(lambda case: case[0] > 1))

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from miurafab.display import Shown
 from miurafab.errors import PatternError
-from miurafab.geometry.arrays import Floats, Ints, run_starts
+from miurafab.geometry.arrays import Floats, Ints, nearest_to_means
 from miurafab.geometry.connected import shortest_ways
 from miurafab.geometry.polygons import edge_lengths, facet_means, sides_and_diagonals
 from miurafab.origami.crease_pattern import CreasePattern
@@ -264,33 +264,25 @@ def facet_tree(pattern: CreasePattern) -> tuple[Ints, Ints, Ints]:
     lengths = edge_lengths(pattern.vertices_coords, pattern.edges_vertices)
     joined = joined[lengths[joined] > _POINT * lengths.mean()]
     left, right = pattern.edges_faces[joined].T
-    distance, previous = shortest_ways(facets, left, right, np.ones(len(joined)), _middles(pattern))
+    distance, previous, link = shortest_ways(
+        facets, left, right, np.ones(len(joined)), _middles(pattern)
+    )
     if np.isinf(distance).any():
         loose = int(np.isinf(distance).sum())
         raise PatternError(
             f"{loose} of {facets} facets are joined to the rest by no crease, so the pattern "
             "cannot be folded as one sheet."
         )
-    depth = distance.astype(np.int64)
-    keys = np.minimum(left, right) * facets + np.maximum(left, right)
-    order = np.argsort(keys, kind="stable")
-    own = np.arange(facets)
-    wanted = np.minimum(own, previous) * facets + np.maximum(own, previous)
-    crease = np.zeros(facets, dtype=np.int64)
-    if len(joined):  # else all are first facets, which hang on no crease
-        place_in = np.searchsorted(keys, wanted, sorter=order).clip(max=len(order) - 1)
-        crease = joined[order[place_in]]
-    return previous, crease, depth
+    crease = np.zeros(facets, dtype=np.int64)  # the first facets hang on none
+    crease[link >= 0] = joined[link[link >= 0]]
+    return previous, crease, distance.astype(np.int64)
 
 
 def _middles(pattern: CreasePattern) -> Ints:
     """The facet of each piece nearest to the middle of the piece when flat."""
     means = facet_means(pattern.vertices_coords, pattern.faces_vertices)
     number = np.zeros(len(means), dtype=np.int64) if pattern.pieces is None else pattern.pieces
-    size = np.bincount(number)
-    middles = np.stack([np.bincount(number, means[:, axis]) / size for axis in (0, 1)], axis=1)
-    away = np.linalg.norm(means - middles[number], axis=1)
-    return np.lexsort((away, number))[run_starts(size)]
+    return nearest_to_means(means, number)
 
 
 def first_facets(pattern: CreasePattern, depth: Ints) -> Ints:
