@@ -5,9 +5,10 @@
 ``[tool.mutants.areas]`` of ``pyproject.toml`` has the modules of each area and its nearest tests;
 ``--deselect=`` before one of them leaves it out, as it is slow.
 Each fault (``.ci/mutations.py``) is run in a process of its own, forked from one that has loaded
-the libraries: the module is loaded with the fault, files stay as they are, and the tests stop at
-the first that fails. The tests that run the faulty line come first, quick ones before slow ones; a
-fault survives if all tests of the area pass. A limit of processor time ends loops that never end.
+the libraries and our modules that need none of the area: the module is loaded with the fault, files
+stay as they are, and the tests stop at the first that fails. The tests that run the faulty line
+come first, quick ones before slow ones; a fault survives if all tests of the area pass. Limits of
+time, by what each test takes without a fault, end loops that never end.
 
 ``tests/survivors.toml`` has the faults that no test can see, with the reason. Prints a row for each
 module; exits 1 if another fault survives, or if a fault of that list is none or is seen.
@@ -41,8 +42,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 TOOLS = ROOT / ".venv" / "tools" / "bin" / "python"
 OPTIONS = ("-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--no-header", "--tb=no")
-IMPORTED = ("-W", "ignore::pytest.PytestAssertRewriteWarning")
-"""Plugins are loaded before the processes are forked, and need no better messages of failure."""
+PLAIN = ("--assert=plain",)
+"""Nobody reads how a test fails, and to rewrite its assertions takes longer than most tests."""
+SLOW_S = 0.5
 SEED = 18
 BROKEN = 99
 ENDS = {0: "survived", 1: "killed", 2: "killed", 4: "killed", -1: "timeout"}
@@ -52,11 +54,16 @@ one that a ``conftest.py`` loads.
 FORK = multiprocessing.get_context("fork")
 
 
+def name_of(path: str) -> str:
+    """The name by which the module at ``path`` is loaded."""
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
 class Faulty(importlib.abc.MetaPathFinder, importlib.abc.Loader):
     """Loads one module from ``source`` instead of from its file."""
 
     def __init__(self, path: str, source: str) -> None:
-        self.name = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        self.name = name_of(path)
         self.path, self.source = ROOT / path, source
 
     def find_spec(self, name, path=None, target=None):
@@ -71,11 +78,31 @@ class Faulty(importlib.abc.MetaPathFinder, importlib.abc.Loader):
         exec(compile(self.source, self.path, "exec"), module.__dict__)
 
 
-class Ordered:
-    """Runs the tests in ``order``; examples of Hypothesis are not made smaller."""
+class Held(importlib.abc.MetaPathFinder):
+    """Loads none of ``modules``, nor what needs one of them."""
 
-    def __init__(self, order: list[str]) -> None:
+    def __init__(self, modules: list[str]) -> None:
+        self.names = {name_of(path) for path in modules}
+
+    def find_spec(self, name, path=None, target=None):
+        if name in self.names:
+            raise RuntimeError(name)
+
+
+class Ordered:
+    """Runs the tests in ``order``, each for five times its ``seconds`` at most and as long as the
+    slowest of all, whose work it may have to do in another order, or ten times as long on the
+    clock; examples of Hypothesis are not made smaller.
+    """
+
+    def __init__(self, order: list[str], seconds: dict[str, float]) -> None:
         self.order = {name: place for place, name in enumerate(order)}
+        self.seconds, self.slowest = seconds, max(seconds.values())
+
+    def pytest_runtest_logstart(self, nodeid):
+        limit = 5 + self.slowest + 5 * self.seconds[nodeid]
+        signal.setitimer(signal.ITIMER_PROF, limit)
+        signal.setitimer(signal.ITIMER_REAL, 10 * limit)
 
     def pytest_sessionstart(self):
         from hypothesis import Phase, settings
@@ -176,10 +203,14 @@ def run_tests(tests: list[str], plugin: object) -> int:
 
     sys.path.insert(0, str(ROOT))
     os.chdir(ROOT)
-    chosen = [*OPTIONS, *IMPORTED, *(["--basetemp", tempfile.mkdtemp()]), *tests]
+    chosen = [*OPTIONS, *PLAIN, *(["--basetemp", tempfile.mkdtemp()]), *tests]
     if isinstance(plugin, Watched):
         chosen.remove("-x")
     return int(pytest.main(chosen, plugins=[plugin]))
+
+
+def _ours(name: str) -> bool:
+    return name.partition(".")[0] == "miurafab"
 
 
 def watched(area: dict[str, list[str]]) -> dict[str, object]:
@@ -191,7 +222,7 @@ def watched(area: dict[str, list[str]]) -> dict[str, object]:
         libraries = [
             name
             for name, module in sys.modules.items()
-            if "site-packages" in str(getattr(module, "__file__", ""))
+            if ("site-packages" in str(getattr(module, "__file__", "")) or _ours(name))
             and not name.startswith("_pytest")
         ]
         return status, [found.seconds, found.lines, found.failed, libraries]
@@ -204,22 +235,28 @@ def watched(area: dict[str, list[str]]) -> dict[str, object]:
 
 
 def order_of(fault: dict, known: dict) -> list[str]:
-    """The tests, those that run the lines of ``fault`` first; within a file quick ones first."""
+    """The tests, those that run the lines of ``fault`` first, slow ones after the others; within
+    a file quick ones first.
+    """
     first, last = fault["statement"]
     lines = {(fault["module"], number) for number in range(first, last + 1)}
     runs = {name: any(tuple(line) in lines for line in ran) for name, ran in known["lines"].items()}
     if not any(runs.values()):  # the line runs as the module is loaded
         runs = {name: bool(ran) for name, ran in known["lines"].items()}
+    seconds = known["seconds"]
+
+    def group(name: str) -> tuple[bool, bool, str]:
+        return not runs[name], seconds[name] > SLOW_S, name.partition("::")[0]
+
     quickest = defaultdict(lambda: float("inf"))
-    for name, took in known["seconds"].items():
-        file = name.partition("::")[0], runs[name]
-        quickest[file] = min(quickest[file], took)
+    for name, took in seconds.items():
+        quickest[group(name)] = min(quickest[group(name)], took)
 
     def place(name: str) -> tuple[object, ...]:
-        file = name.partition("::")[0]
-        return not runs[name], quickest[file, runs[name]], file, known["seconds"][name]
+        *first, file = group(name)
+        return *first, quickest[group(name)], file, seconds[name]
 
-    return sorted(known["seconds"], key=place)
+    return sorted(seconds, key=place)
 
 
 def judged(fault: dict, area: dict, known: dict) -> tuple[str, float]:
@@ -228,16 +265,18 @@ def judged(fault: dict, area: dict, known: dict) -> tuple[str, float]:
     first, last = fault["lines"]
     lines[first:last] = fault["becomes"].split("\n") if fault["becomes"] else []
     order = order_of(fault, known)
-    files = list(dict.fromkeys(name.partition("::")[0] for name in order))
+    files = [name.partition("::")[0] for name in order]
+    alike = next((n for n, file in enumerate(files) if file != files[0]), len(files))
 
-    def work(files: list[str]):
+    def work(tests: list[str]):
         sys.meta_path.insert(0, Faulty(fault["module"], "\n".join(lines) + "\n"))
-        return run_tests(files, Ordered(order)), None
+        files = list(dict.fromkeys(name.partition("::")[0] for name in tests))
+        return run_tests(files, Ordered(tests, known["seconds"])), None
 
     begun = resource.getrusage(resource.RUSAGE_CHILDREN)
-    for part in filter(None, (files[:1], files[1:])):  # one file sees most faults
-        seconds = [known["seconds"][name] for name in order if name.partition("::")[0] in part]
-        status, answer = in_child(lambda part=part: work(part), 20 + 5 * sum(seconds))
+    for part in filter(None, (order[:alike], order[alike:])):  # one file sees most faults
+        limit = 20 + 10 * sum(known["seconds"][name] for name in part)
+        status, answer = in_child(lambda part=part: work(part), limit)
         if status:
             break
     ended = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -278,9 +317,13 @@ def explained() -> dict[tuple[str, ...], str]:
 def run(name: str, area: dict, faults: list[dict], jobs: int) -> Iterator[tuple[dict, str, float]]:
     """Each of ``faults`` in ``area`` with what became of it, as they end."""
     known = watched(area)
+    held = Held(area["modules"])
+    sys.path.insert(0, str(ROOT))
+    sys.meta_path.insert(0, held)
     for library in known["libraries"]:
         with contextlib.suppress(Exception):
             importlib.import_module(library)
+    sys.meta_path.remove(held)
     print(f"{name}: {len(faults)} faults, {len(known['seconds'])} tests", flush=True)
     with concurrent.futures.ProcessPoolExecutor(jobs, mp_context=FORK) as pool:
         calls = {pool.submit(judged, fault, area, known): fault for fault in faults}
