@@ -37,7 +37,7 @@ from miurafab.origami.fitting.request import FitOptions
 from miurafab.studio.form import FIT, LAYOUT, filled
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.design import design
-from miurafab.workflow.energy import EnergyOptions
+from miurafab.workflow.energy_options import EnergyOptions
 from miurafab.workflow.fold_options import FoldOptions
 from miurafab.workflow.tradeoff_options import TradeoffOptions
 

@@ -45,7 +45,7 @@ _OF_PIECES = {
 
 
 def _own_options() -> type:
-    from miurafab.workflow.energy import EnergyOptions
+    from miurafab.workflow.energy_options import EnergyOptions
 
     return EnergyOptions
 

@@ -3,71 +3,37 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from miurafab.errors import InputError, OptionError, PatternError
 from miurafab.files import AnyPath
-from miurafab.options import Choice, Either, Pair, Whole, number, option, read_options
+from miurafab.options import read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy.bar_hinge import Paper, sheet_model
-from miurafab.origami.energy.curve import EnergyCurve, energy_curve
-from miurafab.origami.energy.path import Progress
-from miurafab.origami.energy.pieces import PieceEnergies, energies_of_pieces
-from miurafab.origami.energy.pull import CORNERS, PullCurve, pull
-from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.unfold import FLAT_ANGLE
 from miurafab.profiles import Material, read_material
+from miurafab.workflow.energy_options import CYCLES, STRAIN, EnergyOptions
 from miurafab.workflow.patterns import (
     PatternLike,
     as_pattern,
     consistent_pattern,
     movable_pattern,
 )
-from miurafab.workflow.uncut import uncut_shares
 
-STRAIN, CYCLES = 0.2, 3
+# What solves is imported when the pattern is read: loading it takes longer than the reading.
+if TYPE_CHECKING:
+    from miurafab.origami.energy.bar_hinge import Paper
+    from miurafab.origami.energy.curve import EnergyCurve
+    from miurafab.origami.energy.path import Progress
+    from miurafab.origami.energy.pieces import PieceEnergies
+    from miurafab.origami.energy.pull import PullCurve
+
 STEPS_FROM_FLAT = 20
 """The steps of the motion that finds the folded form of a pattern without one."""
-
-
-@dataclass(frozen=True)
-class EnergyOptions:
-    """The options of an energy curve beside its pattern and its material."""
-
-    steps: int = option(
-        Whole(1, 100_000),
-        "Steps from the folded form to flat, or to the largest extension.",
-        default=40,
-    )
-    crease: int | None = option(
-        Whole(),
-        "The edge whose fold angle is driven.",
-        default_text="a crease in the middle",
-    )
-    crease_ratio: float = option(
-        number(0), "Stiffness of the creases over that of the facets.", default=0.0
-    )
-    pull: str | tuple[int, int] | None = option(
-        Either(Choice((CORNERS,)), Pair(Whole(), "V1,V2", "0,120")),
-        "Pull two vertices apart, two opposite corners of the grid or those given, and tell the "
-        "force in newtons.",
-        default_text="none",
-    )
-    strain: float | None = option(
-        number(-0.9, 10),
-        "With `pull`: how much farther apart, over the distance in the folded form.",
-        default_text=f"{STRAIN:g}",
-    )
-    cycles: int | None = option(
-        Whole(1, 1000),
-        "With `pull`: how often to pull and let go.",
-        default_text=str(CYCLES),
-    )
 
 
 @verb
@@ -133,6 +99,11 @@ def energy(
     if asked.pull is not None:
         return _pulled(found, asked, read_material(material), on_progress)
     paper = None if material is None else _paper(read_material(material))
+
+    from miurafab.origami.energy.bar_hinge import sheet_model
+    from miurafab.origami.energy.curve import energy_curve
+    from miurafab.origami.energy.pieces import energies_of_pieces
+
     if found.pieces_count > 1:
         return energies_of_pieces(
             found,
@@ -154,6 +125,9 @@ def _with_folded_form(pattern: PatternLike) -> CreasePattern:
     if found.folded_coords is not None:
         return consistent_pattern(pattern)
     found = movable_pattern(pattern)
+
+    from miurafab.origami.folding.motion import find_motion
+
     motion = find_motion(found, STEPS_FROM_FLAT).motion
     if not motion.is_rigid:
         raise PatternError(
@@ -202,6 +176,9 @@ def _pulled(
             '[folding] with a line such as crease_length = "50mm" to its file (docs/forces.md says '
             "how to measure it)."
         )
+    from miurafab.origami.energy.pull import pull
+    from miurafab.workflow.uncut import uncut_shares
+
     folding = stock.folding
     paper = replace(
         _paper(stock),
@@ -209,11 +186,10 @@ def _pulled(
         yield_angle=math.inf if folding.yield_angle is None else folding.yield_angle,
         hardening=folding.hardening,
     )
-    assert asked.pull is not None
     return pull(
         pattern,
         paper,
-        asked.pull,
+        None if isinstance(asked.pull, str) else asked.pull,
         strain=STRAIN if asked.strain is None else asked.strain,
         cycles=CYCLES if asked.cycles is None else asked.cycles,
         steps=asked.steps,
@@ -228,6 +204,8 @@ def _paper(stock: Material) -> Paper:
             f"The material '{stock.name}' gives no modulus; add a line such as "
             'modulus = "3GPa" to its file, or leave `material` out.'
         )
+    from miurafab.origami.energy.bar_hinge import Paper
+
     return Paper(stock.thickness_mm, stock.modulus_pa)
 
 

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 RELEASED = 1e-6
 """A force below this part of the largest is none."""
-CORNERS = "corners"
-"""The first and the last vertex of a grid."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -199,7 +197,7 @@ class PullCurve(EnergyResult):
 def pull(
     pattern: CreasePattern,
     paper: Paper,
-    ends: tuple[int, int] | str = CORNERS,
+    ends: tuple[int, int] | None = None,
     *,
     strain: float = 0.2,
     cycles: int = 3,
@@ -209,11 +207,11 @@ def pull(
 ) -> PullCurve:
     """Pull the vertices ``ends`` of ``pattern`` apart by ``strain``, and let go, in ``cycles``.
 
-    The way out has equal ``steps``. ``uncut`` is the share of each edge (E,) that is left uncut, or
-    of all. A negative strain pushes together. Of several pieces the one with both vertices is
-    pulled, alone. Raises
+    Without ``ends`` they are the first and the last vertex of a grid. The way out has equal
+    ``steps``. ``uncut`` is the share of each edge (E,) that is left uncut, or of all. A negative
+    strain pushes together. Of several pieces the one with both vertices is pulled, alone. Raises
     :class:`~miurafab.errors.PatternError` as
-    :func:`~miurafab.origami.energy.bar_hinge.sheet_model` does and for ``corners`` of a pattern
+    :func:`~miurafab.origami.energy.bar_hinge.sheet_model` does and without ``ends`` for a pattern
     without a grid, and :class:`~miurafab.errors.InputError` for vertices that cannot be pulled.
     """
     if pattern.pieces_count > 1:
@@ -247,10 +245,12 @@ def pull(
     return _curve(pulled, pair, paper, converged, driven.slips[bending:])
 
 
-def _piece_of(pattern: CreasePattern, ends: tuple[int, int] | str) -> tuple[Piece, tuple[int, int]]:
+def _piece_of(
+    pattern: CreasePattern, ends: tuple[int, int] | None
+) -> tuple[Piece, tuple[int, int]]:
     """The piece that has both vertices, and these."""
     pieces = pieces_of(pattern)
-    if isinstance(ends, str):
+    if ends is None:
         largest = max(pieces, key=lambda piece: len(piece.facets))
         points = pattern.vertices_coords[largest.vertices]
         far = largest.vertices[np.argmax(np.linalg.norm(points - points[0], axis=1))]
@@ -271,8 +271,8 @@ def _piece_of(pattern: CreasePattern, ends: tuple[int, int] | str) -> tuple[Piec
     return pieces[one], pair
 
 
-def _pair(pattern: CreasePattern, ends: tuple[int, int] | str) -> tuple[int, int]:
-    if isinstance(ends, str):
+def _pair(pattern: CreasePattern, ends: tuple[int, int] | None) -> tuple[int, int]:
+    if ends is None:
         if pattern.grid is None:
             raise PatternError(
                 "The pattern is no full grid, so it has no corners to `pull`; name two vertices, "
