@@ -37,7 +37,8 @@ import serial
 
 from miurafab.gcode.job import Job
 from miurafab.machine.planning import SendOptions, plan_job
-from miurafab.machine.sender import Progress, stream_plan
+from miurafab.machine.progress import Progress
+from miurafab.machine.sender import stream_plan
 from miurafab.machine.virtual_server import PtyWire
 from miurafab.profiles import load_machine
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings

@@ -17,7 +17,8 @@ from typing import Any, Unpack
 from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.machine.keys import Keys, NoKeys
 from miurafab.machine.planning import JobPlan
-from miurafab.machine.sender import Files, Progress, SheetSession, StreamResult
+from miurafab.machine.progress import Progress, StreamResult
+from miurafab.machine.sender import Files, SheetSession
 from miurafab.machine.session_process import Outcome, SessionProcess, suspending_signals
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile

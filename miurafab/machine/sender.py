@@ -26,32 +26,12 @@ from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import FlowTransport
 from miurafab.profiles import MachineProfile
 
-__all__ = [
-    "Files",
-    "Progress",
-    "SheetSession",
-    "StreamOptions",
-    "StreamResult",
-    "deliver",
-    "session_here",
-    "stream_plan",
-]
-
 
 class Files(TypedDict, total=False):
     """The files that record a job while it is sent."""
 
     journal_path: Path | None
     transcript_path: Path | None
-
-
-class StreamOptions(Files, total=False):
-    """... and ``on_progress``, called about five times a second. ``keys`` may hold, resume, abort
-    and override while the job runs.
-    """
-
-    on_progress: Callable[[Progress], None] | None
-    keys: Keys | None
 
 
 class SheetSession(Protocol):
@@ -138,7 +118,9 @@ def stream_plan(
 ) -> StreamResult:
     """Send a planned job to its machine at ``port`` and wait until it is done.
 
-    The other arguments are those of :func:`session_here` and :class:`StreamOptions`.
+    ``on_progress`` is called about five times a second. ``keys`` may hold, resume, abort and
+    override while the job runs. The other arguments are those of :func:`session_here` and
+    :class:`Files`.
 
     Raises :class:`~miurafab.errors.InputError` for a file that cannot be written,
     :class:`~miurafab.errors.PortError` and :class:`~miurafab.errors.ControllerError` for what the

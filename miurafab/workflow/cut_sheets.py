@@ -19,7 +19,8 @@ from miurafab.findings import Finding
 from miurafab.machine.job_process import session_apart
 from miurafab.machine.keys import Keys
 from miurafab.machine.planning import Head, JobPlan, feeds_itself, head_at, plan_job, put_in
-from miurafab.machine.sender import SheetSession, StreamResult, session_here
+from miurafab.machine.progress import StreamResult
+from miurafab.machine.sender import SheetSession, session_here
 from miurafab.machine.trace_box import frame_job
 from miurafab.machine.transport import VIRTUAL, require_port
 from miurafab.options import (

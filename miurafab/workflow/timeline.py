@@ -14,7 +14,7 @@ import numpy as np
 
 from miurafab.gcode.program import strokes
 from miurafab.geometry.arrays import Floats
-from miurafab.machine.sender import Progress
+from miurafab.machine.progress import Progress
 from miurafab.workflow.dry_run import SheetPreview
 
 

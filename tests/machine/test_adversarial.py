@@ -18,8 +18,9 @@ from miurafab.errors import GcodeError, JobStopped, MiurafabError
 from miurafab.gcode.job import Job
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import SendOptions, plan_job
+from miurafab.machine.progress import StreamResult
 from miurafab.machine.resume import Resumption, resume
-from miurafab.machine.sender import StreamResult, deliver
+from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 from miurafab.simulate.beam import standing_seconds

@@ -25,7 +25,8 @@ from miurafab.errors import JobStopped, MiurafabError
 from miurafab.gcode.job import Job
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import plan_job
-from miurafab.machine.sender import Progress, deliver
+from miurafab.machine.progress import Progress
+from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
 from miurafab.simulate.beam import standing_seconds

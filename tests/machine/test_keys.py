@@ -37,8 +37,8 @@ from miurafab.machine.keys import (
     terminal_keys,
 )
 from miurafab.machine.planning import SendOptions, plan_job
-from miurafab.machine.progress import Progress
-from miurafab.machine.sender import StreamResult, deliver
+from miurafab.machine.progress import Progress, StreamResult
+from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.trace_box import frame_job
 from miurafab.profiles import load_machine

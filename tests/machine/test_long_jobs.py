@@ -13,7 +13,8 @@ from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
 from miurafab.machine import judge_job
 from miurafab.machine.planning import SendOptions, plan_job
-from miurafab.machine.sender import Progress, stream_plan
+from miurafab.machine.progress import Progress
+from miurafab.machine.sender import stream_plan
 from miurafab.profiles import load_machine
 
 MACHINE = load_machine("grbl-laser-400")

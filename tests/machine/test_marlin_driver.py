@@ -22,7 +22,8 @@ from miurafab.machine.judge_job import judge_job
 from miurafab.machine.known_controller import PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.planning import SendOptions, plan_job
-from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
+from miurafab.machine.progress import Progress, StreamResult
+from miurafab.machine.sender import deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
 from miurafab.machine.virtual_server import PtyWire, load_controller

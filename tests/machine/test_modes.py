@@ -14,7 +14,8 @@ from miurafab.gcode.job import Job
 from miurafab.grbl.connection import Connection
 from miurafab.machine.modes import SET
 from miurafab.machine.planning import SendOptions, plan_job
-from miurafab.machine.sender import StreamResult, deliver
+from miurafab.machine.progress import StreamResult
+from miurafab.machine.sender import deliver
 from miurafab.machine.session import Session
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.trace_box import frame_job

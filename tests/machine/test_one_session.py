@@ -19,7 +19,7 @@ from miurafab.gcode.job import Job
 from miurafab.machine.journal import read_journal
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.planning import JobPlan, SendOptions
-from miurafab.machine.sender import StreamResult
+from miurafab.machine.progress import StreamResult
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.watchdog import SILENCE_S
 from miurafab.profiles import load_machine

@@ -13,8 +13,9 @@ from miurafab.gcode.job import Job
 from miurafab.machine.dialects import make_safe, virtual_machine
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import SendOptions, plan_job
+from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.resume import resume
-from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
+from miurafab.machine.sender import deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
 from miurafab.machine.virtual_server import PtyWire

@@ -22,7 +22,8 @@ from miurafab.gcode.job import Job
 from miurafab.grbl.streamer import LineRefused
 from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import SendOptions, plan_job
-from miurafab.machine.sender import Progress, StreamResult, deliver, stream_plan
+from miurafab.machine.progress import Progress, StreamResult
+from miurafab.machine.sender import deliver, stream_plan
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.simulate.faults import parse_faults
