@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -107,14 +107,14 @@ def test_a_signal_is_caught_here_unless_somebody_else_catches_it(opened: Opened)
 
 
 def test_a_signal_ends_the_wait_for_a_person_with_the_name_of_the_job(opened: Opened) -> None:
-    with (
-        heeding(signal.SIGINT),
-        pytest.raises(JobStopped, match=r"^rows\.nc was stopped by Ctrl-C\.$"),
-        here() as session,
-        session.waits() as has_ended,
-    ):
-        assert has_ended() is False
-        signal.raise_signal(signal.SIGINT)
+    def wait() -> None:
+        with here() as session, session.waits() as has_ended:
+            assert has_ended() is False
+            signal.raise_signal(signal.SIGINT)
+
+    with heeding(signal.SIGINT), pytest.raises(JobStopped) as caught:
+        wait()
+    assert str(caught.value) == "rows.nc was stopped by Ctrl-C."
     assert opened.wire.closed
 
 
@@ -139,17 +139,26 @@ def test_a_sheet_takes_one_job_until_another_is_loaded(opened: Opened) -> None:
         assert session.cut(JOB).lines == 15
 
 
-@pytest.mark.parametrize("how", ["session", "plan", "wire"])
-def test_a_key_resets_whichever_way_a_job_is_sent(opened: Opened, how: str) -> None:
-    keys, wire = Reset(opened.wire), opened.wire
+def cut_here(wire: FakeWire, keys: Reset) -> None:
+    with here(keys=keys) as session:
+        session.cut(JOB)
+
+
+@pytest.mark.parametrize(
+    "cut",
+    [
+        cut_here,
+        lambda wire, keys: stream_plan(JOB, "a port", keys=keys),
+        lambda wire, keys: deliver(JOB, wire, StopSignals(), keys=keys),
+    ],
+    ids=["session", "plan", "wire"],
+)
+def test_a_key_resets_whichever_way_a_job_is_sent(
+    opened: Opened, cut: Callable[[FakeWire, Reset], object]
+) -> None:
+    wire = opened.wire
     with pytest.raises(JobStopped, match="stopped at the keyboard"):
-        if how == "session":
-            with here(keys=keys) as session:
-                session.cut(JOB)
-        elif how == "plan":
-            stream_plan(JOB, "a port", keys=keys)
-        else:
-            deliver(JOB, wire, StopSignals(), keys=keys)
+        cut(wire, Reset(wire))
     assert wire.commands.endswith(b"\x18")
     assert wire.closed
     wire.settle()
