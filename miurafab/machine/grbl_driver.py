@@ -13,7 +13,7 @@ from __future__ import annotations
 from miurafab.errors import ControllerError, MiurafabError, PersonNeeded
 from miurafab.findings import Finding
 from miurafab.gcode.program import BEAM_M3, PAUSE
-from miurafab.grbl.events import Error, Ok, StatusReport
+from miurafab.grbl.events import Error, Event, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S, RESTARTED
 from miurafab.machine.judge_words import leaves_air_on
@@ -57,6 +57,8 @@ class GrblDriver(StreamDriver):
         )
         self.refusals = self._streamer.refusals
         self._doubtful_reports = 0  # that may tell whether a resume was heard
+        self._listened = 0.0  # seconds; what shows the progress may take longer than a patience
+        self._idle_at: float | None = None  # of these, when it began to idle and owe an answer
 
     @property
     def acknowledged(self) -> int:
@@ -115,11 +117,10 @@ class GrblDriver(StreamDriver):
     def stream(self) -> None:
         """See :class:`StreamDriver`."""
         session, streamer = self._session, self._streamer
-        poll_at = answered = session.now()
+        poll_at = session.now()
+        heard = self._listened
         asked_last = False  # whether a status was asked for after the last acknowledgement
         while True:
-            if not session.connection.in_flight:
-                answered = session.now()
             data = streamer.pull()
             if data:
                 session.write(data)
@@ -129,12 +130,15 @@ class GrblDriver(StreamDriver):
             elif session.now() >= poll_at:
                 session.ask_status()
                 poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
-            events = session.receive(poll_at - session.now())
+            begin = session.now()
+            events = session.receive(poll_at - begin)
+            self._listened += session.now() - begin
+            if session.heard >= begin:
+                heard = self._listened
             for event in events:
                 streamer.take(event)
-                if isinstance(event, Ok | Error):
-                    answered = session.now()
-                elif isinstance(event, StatusReport):
+                self._watch_for_loss(event)
+                if isinstance(event, StatusReport):
                     self._resume_a_late_hold(event)
                     self.tell(
                         self._attend_pause(event) or event.state,
@@ -144,10 +148,7 @@ class GrblDriver(StreamDriver):
                     )
                     if asked_last and event.state in ("Idle", "Check"):
                         return
-                    if event.state != "Idle":  # a dwell is answered after the moves before it
-                        answered = session.now()
-                    self._watch_for_loss(event, answered)
-            if not events and session.now() - session.heard > ANSWER_S:
+            if self._listened - heard > ANSWER_S:
                 raise ControllerError(
                     f"The controller has said nothing for {ANSWER_S:g} s, not even to status "
                     f"queries, {streamer.where}."
@@ -209,11 +210,17 @@ class GrblDriver(StreamDriver):
             return (_WAS_ARMED,)
         return ()
 
-    def _watch_for_loss(self, report: StatusReport, answered: float) -> None:
+    def _watch_for_loss(self, event: Event) -> None:
         """Raise if the controller idles while an answer is missing: the line was damaged."""
         owed = self._session.connection.in_flight
+        if not (isinstance(event, StatusReport) and event.state == "Idle" and owed):
+            if isinstance(event, Ok | Error | StatusReport):
+                self._idle_at = None
+            return
+        if self._idle_at is None:
+            self._idle_at = self._listened
         patience = ANSWER_S + self._streamer.dwell_in_flight
-        if owed and report.state == "Idle" and self._session.now() - answered > patience:
+        if self._listened - self._idle_at > patience:
             raise ControllerError(
                 f"The controller is idle but has not answered line {owed[0].number} of "
                 f"{self.plan.job.name} for {patience:g} s: bytes were lost on the way, so look at "
