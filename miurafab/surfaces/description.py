@@ -24,7 +24,6 @@ from miurafab.files import MOST_MESH_BYTES, Reading, read_bytes
 from miurafab.findings import Finding
 from miurafab.surfaces.catalogue import make_surface
 from miurafab.surfaces.function import sampled_before
-from miurafab.surfaces.mesh import load_mesh, mesh_surface
 from miurafab.surfaces.surface import TargetSurface
 
 
@@ -46,12 +45,16 @@ def described_surface(
         content = read_bytes(mesh, TargetError, MOST_MESH_BYTES)
         if hashlib.sha256(content).hexdigest() != target.get("sha256"):
             return None, no_target(f"the target mesh {mesh} has changed since the fit")
+        from miurafab.surfaces.mesh import load_mesh  # only now: few patterns have one
+
         with Reading(mesh.name, "a mesh that can be a target", TargetError):
             return load_mesh(mesh, place=dict(target))[0], ()
     try:
         if "samples" in target:
             return sampled_before(target), ()
         if "vertices" in target:
+            from miurafab.surfaces.mesh import mesh_surface
+
             vertices = np.array(target["vertices"], dtype=np.float64)
             faces = np.array(target["faces"], dtype=np.int64)
             return mesh_surface(vertices, faces, place=dict(target)), ()

@@ -21,7 +21,7 @@ from miurafab.errors import TargetError
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, vector_product
 from miurafab.surfaces.frame import described, origin_for, origin_in
-from miurafab.surfaces.smoothing import continued
+from miurafab.surfaces.spline import continued
 from miurafab.surfaces.surface import (
     Domain,
     closest_parameters,

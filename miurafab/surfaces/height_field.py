@@ -20,7 +20,6 @@ from miurafab.files import read_bytes
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats
 from miurafab.surfaces.function import SampledSurface, sample
-from miurafab.surfaces.smoothing import smooth
 from miurafab.surfaces.surface import Domain
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp")
@@ -80,6 +79,8 @@ def from_heights(
     domain = Domain(float(x[0]), float(x[-1]), float(y[0]), float(y[-1]))
     points = np.concatenate([places, coarse.reshape(-1, 1)], axis=1)
     spans = tuple(min(max(n // 2, 4), _SPANS) for n in coarse.shape[::-1])
+    from miurafab.surfaces.smoothing import smooth
+
     spline = smooth(places, points, domain, (spans[0], spans[1])).spline
     surface, _ = sample(
         lambda uv: np.concatenate([uv, spline(uv)[..., 2:]], axis=-1), domain, domain

@@ -48,7 +48,8 @@ from miurafab.surfaces.preparation import (
     refuse_other_than_a_disk,
 )
 from miurafab.surfaces.refine import refine
-from miurafab.surfaces.smoothing import Smoothed, continued, smooth
+from miurafab.surfaces.smoothing import Smoothed, smooth
+from miurafab.surfaces.spline import continued
 from miurafab.surfaces.surface import Domain, normal_to, tangents
 from miurafab.surfaces.topology import classify
 from miurafab.surfaces.tube import TubeSurface

@@ -31,7 +31,8 @@ from miurafab.geometry.nearest import tree_of
 from miurafab.geometry.outline import Outline
 from miurafab.surfaces.mesh import MeshChart, median_edge, spans
 from miurafab.surfaces.placement import turned
-from miurafab.surfaces.smoothing import continued, smooth
+from miurafab.surfaces.smoothing import smooth
+from miurafab.surfaces.spline import continued
 from miurafab.surfaces.surface import Domain, gauss_newton, normal_to, unit
 from miurafab.surfaces.topology import border_loops
 

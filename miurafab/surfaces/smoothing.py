@@ -20,12 +20,12 @@ from scipy import sparse
 
 from miurafab.geometry.arrays import Floats
 from miurafab.geometry.sparse import factor_symmetric
+from miurafab.surfaces.spline import DEGREE
 from miurafab.surfaces.surface import Domain
 
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline
 
-_DEGREE = 3
 _PROBES = 8
 _RISEN = 4.0
 """The search for the stiffness ends where the score is this many times the least."""
@@ -67,9 +67,9 @@ def smooth(
     from scipy.interpolate import BSpline, NdBSpline
 
     basis = _rows_of_products(
-        *(BSpline.design_matrix(places[:, k], knots[k], _DEGREE) for k in (0, 1))
+        *(BSpline.design_matrix(places[:, k], knots[k], DEGREE) for k in (0, 1))
     )
-    shape = tuple(len(knot) - _DEGREE - 1 for knot in knots)
+    shape = tuple(len(knot) - DEGREE - 1 for knot in knots)
     # the coefficient of the spline that each basis function takes
     own = np.arange(shape[0] * shape[1])
     if closed:
@@ -104,21 +104,8 @@ def smooth(
             break
     assert best is not None
     coefficients = (best[2] + middle)[own].reshape(*shape, 3)
-    spline = NdBSpline((knots[0], knots[1]), coefficients, _DEGREE, extrapolate=True)
+    spline = NdBSpline((knots[0], knots[1]), coefficients, DEGREE, extrapolate=True)
     return Smoothed(spline, best[1], float(np.sqrt(best[3] / len(points))))
-
-
-def continued(spline: NdBSpline, uv: Floats) -> Floats:
-    """(..., 3) points of ``spline`` at ``uv`` (..., 2); beyond its knots it goes straight on."""
-    low = np.array([knots[_DEGREE] for knots in spline.t])
-    high = np.array([knots[-1 - _DEGREE] for knots in spline.t])
-    inside = np.clip(uv, low, high)
-    beyond = uv - inside
-    points = np.asarray(spline(inside), dtype=np.float64)
-    if beyond.any():
-        points += beyond[..., :1] * spline(inside, nu=(1, 0))
-        points += beyond[..., 1:] * spline(inside, nu=(0, 1))
-    return points
 
 
 def _knots(low: float, high: float, spans: int) -> Floats:
@@ -126,12 +113,12 @@ def _knots(low: float, high: float, spans: int) -> Floats:
 
 
 def _periodic_knots(low: float, high: float, spans: int) -> Floats:
-    return np.asarray(low + (high - low) / spans * np.arange(-_DEGREE, spans + _DEGREE + 1))
+    return np.asarray(low + (high - low) / spans * np.arange(-DEGREE, spans + DEGREE + 1))
 
 
 def _rows_of_products(a: sparse.csr_array, b: sparse.csr_array) -> sparse.csr_array:
     """Row by row the Kronecker product of two design matrices of four entries a row."""
-    n, width = a.shape[0], _DEGREE + 1
+    n, width = a.shape[0], DEGREE + 1
     values = a.data.reshape(n, width, 1) * b.data.reshape(n, 1, width)
     columns = a.indices.reshape(n, width, 1).astype(np.int64) * b.shape[1]
     columns = columns + b.indices.reshape(n, 1, width)
@@ -151,13 +138,13 @@ def _bending(u: Floats, v: Floats) -> sparse.csc_array:
 def _products(knots: Floats) -> list[sparse.csr_array]:
     """Integrals of products of the basis functions, of their first and second derivatives."""
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    edges = np.unique(knots[_DEGREE : len(knots) - _DEGREE])
+    edges = np.unique(knots[DEGREE : len(knots) - DEGREE])
     half = np.diff(edges)[:, None] / 2
     at = (edges[:-1, None] + half * (1 + nodes)).ravel()
     weight = (half * weights).ravel()
-    count = len(knots) - _DEGREE - 1
+    count = len(knots) - DEGREE - 1
     from scipy.interpolate import BSpline
 
-    basis = BSpline(knots, np.eye(count), _DEGREE)
+    basis = BSpline(knots, np.eye(count), DEGREE)
     derivatives = [basis(at, nu=order) for order in range(3)]
     return [sparse.csr_array(d.T @ (weight[:, None] * d)) for d in derivatives]

@@ -26,7 +26,8 @@ from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints, vector_product
 from miurafab.geometry.distances import MeshTrees
 from miurafab.surfaces.harmonic import CylinderMap, cylinder_map
-from miurafab.surfaces.smoothing import continued, smooth
+from miurafab.surfaces.smoothing import smooth
+from miurafab.surfaces.spline import continued
 from miurafab.surfaces.surface import Domain, ParametricSurface, normal_to, tangents
 from miurafab.surfaces.tube_figures import TubeFigures, figures
 

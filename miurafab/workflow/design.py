@@ -13,7 +13,7 @@ import reprlib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,25 +26,24 @@ from miurafab.options import Text, declared, length, read_options, read_value
 from miurafab.origami.fitting.request import DEFAULT_SIZE_MM, FitOptions, FitRequest
 from miurafab.profiles import Table, find_file, read_toml
 from miurafab.surfaces.analytic import GeneralizedCylinder, Revolution
-from miurafab.surfaces.body import BodyChoice
 from miurafab.surfaces.catalogue import CATALOGUE, make_surface, parse_target
 from miurafab.surfaces.description import described_surface
 from miurafab.surfaces.frame import described
-from miurafab.surfaces.function import SampledSurface, from_function, from_points, rounded
+from miurafab.surfaces.function import SampledSurface, from_function, from_points
 from miurafab.surfaces.height_field import IMAGE_SUFFIXES, from_heights
-from miurafab.surfaces.mesh import MeshSurface, load_mesh, mesh_surface
 from miurafab.surfaces.mesh_files import (
     FROM_POINTS,
     MESH_SUFFIXES,
-    arrays_of,
     is_mesh,
     mesh_suffix,
 )
-from miurafab.surfaces.preparation import MeshReading
 from miurafab.surfaces.surface import TargetSurface
-from miurafab.surfaces.tube import TubeSurface
 from miurafab.workflow.image_targets import PARAMETERS as OF_IMAGE
 from miurafab.workflow.image_targets import heights_in, image_named
+
+if TYPE_CHECKING:
+    from miurafab.surfaces.mesh import MeshSurface
+    from miurafab.surfaces.tube import TubeSurface
 
 Values = Mapping[str, Any]
 
@@ -115,19 +114,10 @@ def design(target: object, /, **options: Any) -> Design:
     if isinstance(target, Mapping):
         return _from_description(target, given)
     if is_mesh(target):
-        vertices, faces = arrays_of(target, "The mesh")
-        vertices = rounded(vertices)
+        from miurafab.workflow.mesh_targets import mesh_in_arrays
+
         asked, _ = _asked(given, (), "a mesh")
-        surface = mesh_surface(
-            vertices,
-            faces,
-            region=asked.region,
-            rotate=asked.rotate,
-            reading=MeshReading(asked.side, asked.holes),
-            choice=_choice(asked),
-        )
-        arrays = {"vertices": vertices.tolist(), "faces": faces.tolist()}
-        return _on_mesh(surface, arrays | {"name": "mesh"}, asked, "mesh")
+        return _on_mesh(*mesh_in_arrays(target, asked), asked, "mesh")
     if isinstance(target, np.ndarray | list | tuple):
         return _on_array(target, given)
     if callable(target):
@@ -283,16 +273,9 @@ def read_layout_table(
 
 
 def _from_mesh(path: Path, asked: FitOptions, title: str) -> Design:
-    reading = MeshReading(asked.side, asked.holes)
-    with Reading(path.name, "a mesh that can be a target", TargetError):
-        surface, sha256 = load_mesh(
-            path, region=asked.region, rotate=asked.rotate, reading=reading, choice=_choice(asked)
-        )
-    return _on_mesh(surface, {"mesh": str(path.resolve()), "sha256": sha256}, asked, title)
+    from miurafab.workflow.mesh_targets import mesh_in_file  # only now: few targets are meshes
 
-
-def _choice(asked: FitOptions) -> BodyChoice:
-    return BodyChoice(asked.poles, asked.polar_hole_mm, asked.pieces)
+    return _on_mesh(*mesh_in_file(path, asked), asked, title)
 
 
 def _on_mesh(

@@ -23,7 +23,6 @@ from miurafab.errors import InputError
 from miurafab.options import declared, read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
-from miurafab.origami.fitting.fit import fit
 from miurafab.origami.fitting.request import FitOptions
 from miurafab.origami.tradeoff import Sample, Tradeoff, summarise
 from miurafab.workflow.design import design
@@ -120,6 +119,9 @@ def sample(job: Job) -> Sample:
     """One fit: ``job`` is a target and the options of its design."""
     target, options = job
     request = design(target, **options).request
+
+    from miurafab.origami.fitting.fit import fit  # only now: a target may be none
+
     result = fit(request)
     if result.status == "interrupted":
         raise KeyboardInterrupt  # one sheet of the series is no answer

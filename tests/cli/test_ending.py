@@ -201,14 +201,15 @@ def test_an_interrupted_fit_writes_its_best_sheet(run, monkeypatch, tmp_path):
 )
 def test_ctrl_c_in_a_fit_on_the_way_ends_the_command(run, monkeypatch, tmp_path, command):
     """Although the fit has a sheet by then."""
-    from miurafab.workflow import fit, tradeoff
+    from miurafab.origami.fitting import fit as solved
+    from miurafab.workflow import fit
 
-    asked = tradeoff.fit
+    asked = solved.fit
 
     def interrupted(request, on_progress=None):
         return replace(asked(replace(request, facets=(4, 4))), status="interrupted")
 
-    monkeypatch.setattr(tradeoff, "fit", interrupted)
+    monkeypatch.setattr(solved, "fit", interrupted)
     monkeypatch.setattr(fit, "fit_request", interrupted)
     assert sentence(run(*command), 130) == "miurafab: Interrupted."
     assert not (tmp_path / "jobs").exists()
