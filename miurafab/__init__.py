@@ -98,7 +98,7 @@ if TYPE_CHECKING:
     from miurafab.workflow.quicker import QuickerWay as QuickerWay
     from miurafab.workflow.rebuild import Rebuilt as Rebuilt
     from miurafab.workflow.rebuild import rebuild as rebuild
-    from miurafab.workflow.sheets import SheetJob as SheetJob
+    from miurafab.workflow.sheet_job import SheetJob as SheetJob
     from miurafab.workflow.sheets import sheets as sheets
     from miurafab.workflow.tradeoff import tradeoff as tradeoff
 

@@ -15,7 +15,7 @@ from miurafab.options import File, Text
 
 if TYPE_CHECKING:
     from miurafab.workflow.job_directory import JobDirectory
-    from miurafab.workflow.sheets import SheetJob
+    from miurafab.workflow.sheet_job import SheetJob
 
 EXAMPLES = (
     "miurafab sheets hypar.fold -o jobs/hypar",

@@ -160,7 +160,7 @@ def _from_value(
 
     if not isinstance(thing, str | os.PathLike):
         from miurafab.workflow.job_directory import JobDirectory
-        from miurafab.workflow.sheets import SheetJob
+        from miurafab.workflow.sheet_job import SheetJob
 
         if isinstance(thing, JobDirectory | SheetJob):
             _fitted_already(options, thing)
@@ -238,7 +238,7 @@ def _from_pattern(
     if faults:
         profile = read_machine(machine)
         return Prepared(name, profile, (), (), report=report, refused=faults)
-    from miurafab.workflow.sheets import make_job
+    from miurafab.workflow.sheet_job import make_job
 
     job = make_job(
         pattern,

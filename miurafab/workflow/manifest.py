@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, get_args
 
 from miurafab.errors import InputError, is_plain
-from miurafab.fabrication.layout import read_head
 from miurafab.files import Reading, file_name, parse_json, read_bytes, read_text, write_draft
 from miurafab.findings import Finding
 from miurafab.profiles.shipped import Kind, shipped_directory
@@ -83,6 +82,8 @@ def read_manifest(directory: Path) -> Manifest:
 def pattern_name(folder: Path, manifest: Manifest) -> str:
     """The file name of the pattern of the job in ``folder``: that which its layout is of."""
     path = folder / LAYOUT
+    from miurafab.fabrication.layout import read_head  # slow to load
+
     name = read_head(read_text(path, InputError, "a layout"), path).pattern_file
     if name not in manifest.files:
         raise InputError(f"{folder / MANIFEST} does not name {name}, the pattern of the layout.")

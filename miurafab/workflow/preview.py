@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from miurafab.display import Shown
 from miurafab.errors import InputError
-from miurafab.fabrication.layout import LayoutHead, read_head
 from miurafab.fabrication.wording import count
 from miurafab.files import AnyPath, as_path, new_folder, read_text
 from miurafab.findings import Finding, findings_json
@@ -37,9 +36,10 @@ from miurafab.workflow.job_files import job_machine, job_material, settle_job
 from miurafab.workflow.manifest import LAYOUT, edits, sha256
 
 if TYPE_CHECKING:
+    from miurafab.fabrication.layout import LayoutHead
     from miurafab.fabrication.mates import SeamTab
     from miurafab.workflow.job_directory import JobDirectory
-    from miurafab.workflow.sheets import SheetJob
+    from miurafab.workflow.sheet_job import SheetJob
 
 Progress = Callable[[float, str], None]
 
@@ -262,7 +262,7 @@ def _of_value(
     """The preview of a job in memory or of one that was read, its programs and most power."""
     from miurafab.fabrication.mates import seam_tabs  # slow to load
     from miurafab.workflow.job_directory import JobDirectory
-    from miurafab.workflow.sheets import SheetJob
+    from miurafab.workflow.sheet_job import SheetJob
 
     if not isinstance(job, SheetJob | JobDirectory):
         raise InputError(
@@ -302,6 +302,8 @@ def _read_layout(path: Path) -> LayoutHead | None:
     settle_job(path.parent)
     if not path.is_file():
         return None
+    from miurafab.fabrication.layout import read_head  # slow to load
+
     return read_head(read_text(path, InputError, "a layout"), path)
 
 
@@ -393,7 +395,6 @@ def _pattern(path: Path, layout: LayoutHead, findings: list[Finding]) -> CreaseP
         says = f"{file} has changed since the sheets were made, so it is not shown."
         findings.append(Finding("pattern-changed", says, str(file)))
         return None
-    name = layout.pattern_file
-    says = f"The pattern {name} is not there, so its fold is not shown."
-    findings.append(Finding("pattern-missing", says, name))
+    says = f"The pattern {file.name} is not there, so its fold is not shown."
+    findings.append(Finding("pattern-missing", says, file.name))
     return None

@@ -27,7 +27,7 @@ from miurafab.profiles import OPERATIONS, MachineProfile, Material
 from miurafab.profiles.material import Crease, Perforation
 
 if TYPE_CHECKING:
-    from miurafab.workflow.sheets import SheetJob
+    from miurafab.workflow.sheet_job import SheetJob
 
 SAMPLE = 1000
 """So many strokes are timed at most (a third of a second)."""

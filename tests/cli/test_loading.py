@@ -1,6 +1,7 @@
 """What a command may load before its work begins: so a start costs no more than it must.
 
-Each library here takes from 20 to 200 ms of processor time. ``benchmarks/start.py`` has the times.
+Each library here, and each of the own modules with all that they load, takes from 20 to 200 ms of
+processor time. ``benchmarks/start.py`` has the times.
 """
 
 import subprocess
@@ -25,6 +26,9 @@ LIBRARIES = [
     "svgwrite",
     "trimesh",
     "http.client",
+    "miurafab.fabrication.sheets",
+    "miurafab.origami.fitting.fit",
+    "miurafab.surfaces.mesh",
 ]
 NOTHING = set()
 SHAPES = {"numpy", "shapely"}
@@ -56,7 +60,7 @@ STARTS = {
     "convert gone.fold x.svg": SHAPES,
     "sheets gone.fold -o x": SHAPES,
     "preview gone": SHAPES,
-    "cut gone --port virtual": PATTERN,
+    "cut gone --port virtual": SHAPES,
     "fold gone.fold": PATTERN,
 }
 STARTED = """
