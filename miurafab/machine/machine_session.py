@@ -110,8 +110,8 @@ class MachineSession:
         """
         self._signals.hold()
         dark = self._stops = True
-        if self._at_risk:
-            self._at_risk = False
+        at_risk, self._at_risk = self._at_risk, False
+        if at_risk:
             dark = self.conversation.stop()
         self._transport.close()
         self._release()
@@ -183,7 +183,7 @@ class MachineSession:
         """Run the homing cycle (``$H``) and wait for its end."""
         self.open()
         self._at_risk = True
-        self._or_stop(lambda: self.conversation.command("$H", HOMING_S))
+        self._or_stop(self.conversation.home)
         return self.look()
 
     def jog(
@@ -232,7 +232,7 @@ class MachineSession:
         order = self._pad.next_order(
             session.now(),
             session.machine_position,
-            session.status is not None and session.status.state == "Idle",
+            self.state.idle,
             self.known.settings.values,
         )
         if order is None:

@@ -21,6 +21,7 @@ from miurafab.machine.owner import Owner, owner_of, this_owner
 from miurafab.machine.progress import Progress
 from miurafab.machine.resting_beam import resting_power
 from miurafab.machine.signals import StopSignals
+from miurafab.simulate.faults import parse_faults
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 
@@ -336,6 +337,28 @@ def test_a_key_acts_while_no_job_runs(key: str, order: bytes) -> None:
     assert sent_by(wire, lambda: session.watch(0.1)) == order
 
 
+def test_a_key_waits_for_a_controller_that_is_deaf_while_it_stores() -> None:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
+    keys = Once()
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
+    session.open()
+    stores = session.conversation.connection
+    deaf: list[bool] = []
+
+    def press(call: int) -> None:
+        deaf.append(stores.writing_eeprom)
+        if deaf[-1] and not any(deaf[:-1]):
+            keys.keys = "+"
+        if wire.commands.endswith(b"\x91"):
+            assert not stores.writing_eeprom
+            wire.before_call = lambda call: None
+
+    wire.before_call = press
+    session.say("G10 L2 P1 X1")
+    assert wire.commands.count(b"\x91") == 1
+    assert any(deaf)
+
+
 def test_another_arrow_cancels_a_step_and_moves_at_rest() -> None:
     session, wire = here()
     session.open()
@@ -361,8 +384,9 @@ def test_a_key_that_aborts_a_jog_that_is_waited_for(key: str, sent: bytes) -> No
             keys.keys, wire.before_call = key, lambda call: None
 
     wire.before_call = press
-    with pytest.raises(JobStopped, match="stopped at a key"):
+    with pytest.raises(JobStopped, match="stopped at a key") as caught:
         session.jog(x=50.0)
+    assert type(caught.value) is JobStopped
     assert wire.commands.partition(b"F1000\n")[2] == sent
 
 
@@ -390,6 +414,112 @@ def test_a_session_is_opened_with_a_reset_where_one_is_asked_for() -> None:
     session.conversation.pause(0.5)
     session.open(reset=True)
     assert wire.commands.startswith(b"\x18")
+
+
+def test_homing_greets_the_machine_and_tells_where_it_stands_after_a_restart() -> None:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE) | HOMING, baud=115_200))
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    assert sent_by(wire, session.home).startswith(b"$I\n$$\n")
+    session.jog(x=-300.0, y=-300.0)
+    session.set_origin()
+    wire.device.power_cycle()
+    assert session.watch(1.0).state == "Alarm"
+    session.unlock()
+    with pytest.raises(ControllerError, match="restarted by itself since the last job"):
+        session.cut(JOB)
+    session.home()
+    session.jog(x=-300.0, y=-300.0)
+    session.set_origin()
+    assert session.cut(JOB).lines == 15
+
+
+def test_the_origin_of_jobs_is_gone_to_from_any_place_and_system() -> None:
+    session, wire = here()
+    session.say("G10 L2 P2 X7 Y8")
+    session.say("G55")
+    session.jog(x=20.0, y=30.0)
+    session.go_to_origin()
+    assert wire.device.position[:2] == pytest.approx((0.0, 0.0), abs=0.01)
+    assert "G54" in session.state.modes
+
+
+@pytest.mark.parametrize("action", ["jog", "settle"])
+def test_a_motion_that_is_waited_for_is_asked_about_ten_times_a_second(action: str) -> None:
+    session, wire = jogging() if action == "settle" else here()
+    session.open()
+    begun, before = wire.now(), wire.bytes_written.count(b"?")
+    if action == "settle":
+        session.settle()
+    else:
+        session.jog(x=50.0)
+    seconds = wire.now() - begun
+    assert seconds > 0.5
+    assert wire.bytes_written.count(b"?") - before <= 10 * seconds + 3
+
+
+def test_settling_leaves_a_motion_that_burns_to_whoever_ordered_it() -> None:
+    session, wire = here()
+    session.say("M4 S500")
+    session.say("G1 X50 F600")
+    begun = wire.now()
+    state = session.settle()
+    assert (state.state, state.beam_on) == ("Run", True)
+    assert wire.now() - begun < 0.5
+
+
+def test_a_step_that_is_refused_is_told_and_the_next_begins_afresh() -> None:
+    session, wire = here(s20=1, **{f"s{number}": value for number, value in HOMING.items()})
+    session.home()
+    with pytest.raises(ControllerError, match="error:15"):
+        session.nudge(900.0, 0.0)
+    assert sent_by(wire, lambda: session.nudge(-5.0, 0.0)).startswith(b"$J=G21G91X-5.000F")
+    session.watch(1.0)
+    assert session.state.state == "Idle"
+
+
+def test_a_session_leaves_a_board_that_rests_as_it_is() -> None:
+    session, wire = here()
+    wire.device.advance(0.5)
+    wire.device.take_output()
+    session.conversation.pause(0.5)
+    session.open()
+    assert wire.commands.startswith(b"$I\n")
+
+
+def test_a_silent_board_is_waited_for_as_long_as_was_asked() -> None:
+    def seconds(wait: float) -> float:
+        wire = FakeWire(VirtualGrbl(baud=115_200, faults=parse_faults(["drop-reply=all@0s"])))
+        with pytest.raises(PortError, match="Nothing that speaks GRBL"):
+            MachineSession(wire, StopSignals(), PortSetup.of(MACHINE)).open(wait)
+        return wire.now()
+
+    assert 8 < seconds(9.0) - seconds(4.0) <= 10  # for a word, and once more after a reset
+
+
+def test_nothing_is_asked_by_an_old_report_while_a_step_is_made() -> None:
+    """What GRBL is asked in mid-jog it refuses; the disarming left its modes untold."""
+    session, wire = here()
+    session.say("M4")
+    session.nudge(50.0, 0.0)
+    wire.lies = [(wire.now() + 0.01, b"<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\n")]
+    assert sent_by(wire, lambda: session.watch(0.1)) == b""
+    assert sent_by(wire, lambda: session.watch(5.0)) == b"$G\n"
+
+
+def test_a_watch_looks_at_the_wire_fifty_times_a_second() -> None:
+    """A key that is held makes its next step as soon as it is due."""
+    session, wire = here()
+    session.open()
+    waits: list[float] = []
+    read = wire.read
+
+    def reading(timeout: float) -> bytes:
+        waits.append(timeout)
+        return read(timeout)
+
+    wire.read = reading  # type: ignore[method-assign]
+    session.watch(0.5)
+    assert max(waits) == pytest.approx(0.02)
 
 
 def test_the_state_is_told_once_a_report_and_asked_for_ten_times_a_second() -> None:
@@ -446,8 +576,11 @@ def test_realtime_bytes_of_a_person_are_no_lines() -> None:
     for text in "!~":
         assert sent_by(wire, lambda text=text: session.say(text)) == text.encode()
     before = wire.bytes_written.count(b"?")
+    told: list[str] = []
+    session.lines.on_line = told.append
     session.say("?")
     assert wire.bytes_written.count(b"?") > before
+    assert [line for line in told if line.startswith("<Idle")] != []
     assert sent_by(wire, lambda: session.say(" reset ")) == b"\x18"
     assert sent_by(wire, lambda: session.say("(a comment)")) == b""
 
@@ -510,6 +643,12 @@ def test_who_is_said_to_own_a_port_owns_it(monkeypatch: pytest.MonkeyPatch, tmp_
     told = Owner("miurafab cut x", mine.process, mine.since, mine.holder)
     session = MachineSession(wire, StopSignals(), owner=told)
     assert owner_of(wire.name) == told
+    session.close()
+    assert owner_of(wire.name) is None
+    session = MachineSession(wire, StopSignals())
+    named = owner_of(wire.name)
+    assert named is not None
+    assert (named.process, named.holder) == (mine.process, mine.holder)
     session.close()
     assert owner_of(wire.name) is None
 
