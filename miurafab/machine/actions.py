@@ -75,7 +75,6 @@ def conversation(
     """
     with signals or StopSignals() as signals:
         transport = open_port(port, line.get("baud", BAUD), line.get("settings"))
-        signals.at_once = transport.blocks
         session = MachineSession(transport, signals)
         try:
             session.open(line.get("wait", WAIT_S), reset=line.get("reset", False))

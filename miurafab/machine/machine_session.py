@@ -70,6 +70,7 @@ class MachineSession:
             self.conversation.patience = _KEY_S
         self._wire = OpenWire(transport, self.conversation, self.known, self._keys, signals)
         self._transport, self._signals, self._setup = transport, signals, setup
+        signals.at_once = transport.blocks
         self._orders = session_keys(setup.dialect)
         self._pad = JogPad()
         self._at_risk = self._in_job = self._stops = False

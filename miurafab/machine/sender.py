@@ -98,7 +98,6 @@ def session_here(
     with StopSignals() if signals is None else nullcontext(signals) as signals:
         try:
             transport = open_machine(machine, port, virtual_speed)
-            signals.at_once = transport.blocks
             session = MachineSession(transport, signals, PortSetup.of(machine), keys)
             with closing(session):
                 yield _SessionHere(session, signals)

@@ -320,7 +320,6 @@ def _opened(
     opening: PortOpening, signals: StopSignals, parent: ParentWatch, tell: Callable[[Message], None]
 ) -> Any:
     transport = open_machine(opening.machine, opening.port, opening.virtual_speed)
-    signals.at_once = transport.blocks
     owner = replace(opening.owner, holder=os.getpid())
     session = MachineSession(transport, signals, PortSetup.of(opening.machine), parent, owner)
     session.on_state = tell

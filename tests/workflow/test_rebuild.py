@@ -3,7 +3,9 @@ wrongly is not."""
 
 from __future__ import annotations
 
+import itertools
 import re
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +14,11 @@ from piece_problems import gores, trimmed
 from problems import regular
 
 import miurafab as mf
-from miurafab.errors import InputError, PatternError
+from miurafab.errors import InputError, JobStopped, PatternError
 from miurafab.fabrication.glue import glued_shell, laid_on
 from miurafab.fabrication.recover import RecoveredCorners
 from miurafab.geometry.polygons import facet_means
+from miurafab.motion.segments import SegmentGenerator
 
 CASES = {
     "patches": (regular, {"max_patch": (60, 60)}),
@@ -47,6 +50,22 @@ def test_a_crease_burnt_beside_its_place_is_seen_in_the_shell(tmp_path):
     )
     file.write_text(file.read_text()[:start] + moved)
     assert mf.rebuild(tmp_path).worst_mm > 2 * whole > 0
+
+
+def test_a_signal_while_the_beam_is_rebuilt_stops_it(tmp_path, monkeypatch):
+    """In mid-move of the controller in memory, whose program must not be torn."""
+    mf.sheets(regular()).write(tmp_path)
+    segment, calls = SegmentGenerator.next, itertools.count()
+
+    def pressed(self):
+        if next(calls) == 500:
+            signal.raise_signal(signal.SIGINT)
+        return segment(self)
+
+    monkeypatch.setattr(SegmentGenerator, "next", pressed)
+    with pytest.raises(JobStopped, match="Ctrl-C"):
+        mf.rebuild(tmp_path)
+    assert next(calls) > 500
 
 
 def test_facets_that_the_border_has_cut_are_left_out_as_in_check(tmp_path):
