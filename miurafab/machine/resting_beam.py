@@ -16,12 +16,13 @@ from collections.abc import Iterable
 
 from miurafab.errors import GcodeError
 from miurafab.gcode.block_errors import BlockError
+from miurafab.gcode.job import plain_code
 from miurafab.gcode.words import split_words
 from miurafab.machine.known_controller import KnownController
 
 _LASER_MODE = 32
 _BURNING = (1.0, 2.0, 3.0)
-_STARTUP = re.compile(r"\$N\d=(.*)", re.IGNORECASE)
+_STARTUP = re.compile(r"\$N\d=(.*)")
 
 
 def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> float:
@@ -62,12 +63,13 @@ class RestingBeam:
         would put the resting beam on, or its power up, unless it is the same as the last.
         """
         held, self._held = self._held, ""
-        block = _STARTUP.fullmatch(line.replace(" ", ""))
-        if block is None and line.startswith("$"):
+        read = plain_code("", 0, line)
+        block = _STARTUP.fullmatch(read)
+        if block is None and read.startswith("$"):
             return line
         if line != held:
-            self._refuse(line, line if block is None else block[1], starts=block is not None)
-        self._since.append(line if block is None else block[1])
+            self._refuse(line, read if block is None else block[1], starts=block is not None)
+        self._since.append(read)  # a startup block was run before it is answered
         return line
 
     def _refuse(self, line: str, text: str, *, starts: bool) -> None:
@@ -81,10 +83,10 @@ class RestingBeam:
         before = [
             word for mode in (*self._known.modes.modes, *self._since) for word in _words(mode)
         ]
+        now = 0.0 if state.beam_off else resting_power(before, laser_mode=laser_mode)
         power = resting_power([*before, *_words(text)], laser_mode=laser_mode)
-        if starts:
-            power = max(power, resting_power(_words(text), laser_mode=laser_mode))
-        if power <= (0.0 if state.beam_off else resting_power(before, laser_mode=laser_mode)):
+        later = resting_power(_words(text), laser_mode=laser_mode) if starts else 0.0
+        if power <= now and later == 0.0:
             return
         self._held = line
         end = "M5, and again after each reset" if starts else "M5 or a reset"

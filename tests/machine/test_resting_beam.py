@@ -1,0 +1,111 @@
+"""Which lines of a person would light a resting beam, and which are sent as they are."""
+
+from __future__ import annotations
+
+import pytest
+from session_walk import MACHINE
+from wires import FakeWire
+
+from miurafab.errors import GcodeError
+from miurafab.machine.known_controller import PortSetup
+from miurafab.machine.machine_session import MachineSession
+from miurafab.machine.resting_beam import resting_power
+from miurafab.machine.signals import StopSignals
+from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
+
+
+def here(laser_mode: bool) -> tuple[MachineSession, FakeWire]:
+    values = virtual_settings(MACHINE) | {32: float(laser_mode)}
+    wire = FakeWire(VirtualGrbl(values, baud=115_200))
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    session.open()
+    return session, wire
+
+
+def is_sent(session: MachineSession, wire: FakeWire, line: str) -> bool:
+    """Whether ``line`` is sent at once; held back, nothing of it is."""
+    before = len(wire.commands)
+    try:
+        session.say(line)
+    except GcodeError:
+        assert wire.commands[before:].replace(b"$G\n", b"") == b""
+        return False
+    return True
+
+
+@pytest.mark.parametrize(
+    ("words", "laser_mode", "power"),
+    [
+        ([("M", 3)], False, 0.0),
+        ([("S", 500)], False, 0.0),
+        ([("G", 1), ("S", 500)], True, 0.0),
+        ([("G", 1), ("M", 3), ("S", 500), ("X", 0)], True, 500.0),
+        ([("M", 3), ("S", 500), ("X", 1)], True, 0.0),
+    ],
+)
+def test_nothing_but_modes_lights_a_beam(
+    words: list[tuple[str, float]], laser_mode: bool, power: float
+) -> None:
+    assert resting_power(words, laser_mode=laser_mode) == power
+
+
+def test_a_burning_beam_may_be_turned_down_and_not_up() -> None:
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "M3 S500")
+    assert is_sent(session, wire, "M3 S500")
+    assert is_sent(session, wire, "S300")
+    assert is_sent(session, wire, "S300")
+    assert not is_sent(session, wire, "S301")
+    assert wire.device.beam_on
+    assert session.close()
+    assert not wire.device.beam_on
+
+
+def test_the_weakest_beam_is_asked_for_twice_with_what_ends_it() -> None:
+    session, wire = here(laser_mode=False)
+    with pytest.raises(GcodeError, match=r"S0\.5, .*\(\$32=0\).* until M5 or a reset\. Send"):
+        session.say("M3 S0.5")
+    assert not wire.device.beam_on
+
+
+@pytest.mark.parametrize("line", ["$$", "$X", "$N"])
+def test_what_is_no_program_is_sent_whatever_is_armed(line: str) -> None:
+    """The laser mode is left with the beam armed, dark until the next line of a program."""
+    session, wire = here(laser_mode=True)
+    session.say("M3 S900")
+    session.say("$32=0")
+    assert is_sent(session, wire, line)
+    assert line.encode() + b"\n" in wire.commands
+
+
+@pytest.mark.parametrize(
+    "line", ["m3 s500", "M3 s500", "/M3 S500", "$n0=m3 s500", "$N0=m3S500", "$ n 0 = M3 / S500"]
+)
+def test_a_line_is_held_back_as_the_firmware_reads_it(line: str) -> None:
+    """In capitals, without blanks and the sign of block delete (gnea/grbl 1.1, ``protocol.c``)."""
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, line)
+    assert not wire.device.beam_on
+    assert is_sent(session, wire, line)
+    assert wire.device.beam_on
+    assert session.close()
+    assert not wire.device.beam_on
+
+
+def test_a_startup_block_that_lights_each_start_is_held_back_under_a_burning_beam() -> None:
+    """It lights nothing now that does not burn, but a reset would end nothing any more."""
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "M3 S500")
+    assert is_sent(session, wire, "M3 S500")
+    assert not is_sent(session, wire, "$N0=M3S500")
+    assert session.abort()
+    assert not wire.device.beam_on
+
+
+def test_a_startup_block_has_run_when_it_is_answered() -> None:
+    """Its modes are told by then, as the storing waits for its motion."""
+    session, wire = here(laser_mode=True)
+    assert is_sent(session, wire, "$N0=G1X30F600M3")
+    assert wire.device.position[0] == pytest.approx(30.0)
+    assert not is_sent(session, wire, "S900")
+    assert not wire.device.beam_on
