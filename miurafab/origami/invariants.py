@@ -59,13 +59,12 @@ def residuals(pattern: CreasePattern) -> Residuals:
     """All residuals of the folded ``pattern``."""
     assert pattern.folded_coords is not None
     ring, inner = corner_ring(pattern, pattern.folded_coords), interior_vertices(pattern)
-    none = np.empty(0)
     return Residuals(
         ring,
         inner,
         facet_planarity(pattern, pattern.folded_coords),
-        np.abs(angle_defect(ring, inner)) if len(inner) else none,
-        kawasaki_residual(ring, inner, pattern.edges_creased) if len(inner) else none,
+        np.abs(angle_defect(ring, inner)),
+        kawasaki_residual(ring, inner, pattern.edges_creased),
         isometry(pattern),
         exactness(pattern),
     )
@@ -106,23 +105,20 @@ def corner_ring(pattern: CreasePattern, points: Floats) -> CornerRing:
     """The corners of ``pattern`` with their angles in ``points`` (V, 3)."""
     faces = pattern.faces_vertices
     count, k = faces.shape
-    before = previous_corners(faces)
-    real = faces >= 0
     angle = corner_angles(points, faces)
 
     # the corner that starts each directed side: sides[e, 0] along the edge, sides[e, 1] against it
-    sides = np.full((len(pattern.edges_vertices), 2), -1, dtype=np.int64)
+    sides = np.full(pattern.edges_vertices.shape, -1)
     edges = pattern.faces_edges
-    face, corner = np.nonzero(real)
-    edge = edges[face, corner]
-    against = (pattern.edges_vertices[edge, 0] != faces[face, corner]).astype(np.int64)
-    sides[edge, against] = face * k + corner
+    face, corner = np.nonzero(faces >= 0)
+    here, vertex = face * k + corner, faces[face, corner]
+    outgoing = edges[face, corner]
+    sides[outgoing, (pattern.edges_vertices[outgoing, 0] != vertex).astype(np.int64)] = here
     # the next corner counter-clockwise starts the side opposite to the incoming side
-    incoming = np.take_along_axis(edges, before, axis=1)[face, corner]
-    leaves_against = (pattern.edges_vertices[incoming, 0] != faces[face, corner]).astype(np.int64)
-    following = np.full(count * k, -1, dtype=np.int64)
-    following[face * k + corner] = sides[incoming, leaves_against]
-    edge = np.where(real, np.take_along_axis(edges, before, axis=1), -1).reshape(-1)
+    incoming = edges[face, previous_corners(faces)[face, corner]]
+    leaves_against = (pattern.edges_vertices[incoming, 0] != vertex).astype(np.int64)
+    following, edge = np.full((2, count * k), -1)
+    following[here], edge[here] = sides[incoming, leaves_against], incoming
     return CornerRing(faces.reshape(-1), angle.reshape(-1), following, edge)
 
 
@@ -131,7 +127,7 @@ def corner_angles(points: Floats, faces: Ints) -> Floats:
     than pi where a facet is not convex; 0 where it has fewer corners.
     """
     if points.shape[1] == 2:
-        points = np.pad(points, ((0, 0), (0, 1)))
+        points = np.column_stack([points, np.zeros(len(points))])
     here = points[faces]
     to_next, to_previous = (
         points[np.take_along_axis(faces, beside, axis=1)] - here
@@ -143,31 +139,30 @@ def corner_angles(points: Floats, faces: Ints) -> Floats:
 
 def interior_vertices(pattern: CreasePattern) -> Ints:
     """(I,) the vertices that belong to a facet and lie on no border edge."""
-    inside = np.zeros(len(pattern.vertices_coords), dtype=bool)
-    inside[pattern.faces_vertices[pattern.faces_vertices >= 0]] = True
     open_edges = (pattern.edges_faces < 0).any(axis=1)
-    inside[pattern.edges_vertices[open_edges]] = False
-    return np.flatnonzero(inside)
+    inside = np.setdiff1d(pattern.faces_vertices, pattern.edges_vertices[open_edges])
+    return np.asarray(inside[inside >= 0])
 
 
 def angle_defect(ring: CornerRing, vertices: Ints) -> Floats:
-    """(I,) 2 pi minus the sum of the sector angles at ``vertices``, radians; 0 is developable."""
+    """(I,) 2 pi minus the sum of the sector angles at interior ``vertices``, radians; 0 is
+    developable.
+    """
     real = ring.vertex >= 0
-    total = np.bincount(ring.vertex[real], ring.angle[real], minlength=int(vertices.max()) + 1)
+    total = np.bincount(ring.vertex[real], ring.angle[real])
     return np.asarray(2 * np.pi - total[vertices])
 
 
 def kawasaki_residual(ring: CornerRing, vertices: Ints, creased: Bools) -> Floats:
-    """(I,) |alternate sum of sector angles - pi| at interior ``vertices``, radians.
+    """(I,) |alternate sum of sector angles - pi| at interior ``vertices``, radians, of both sums
+    the larger.
 
     A sector runs from one of the ``creased`` edges (E,) to the next. It is Kawasaki's condition for
     any even number of creases; a vertex of an odd number cannot fold flat and gets pi, and one
     without creases gets 0.
     """
-    corners = np.flatnonzero(ring.vertex >= 0)
-    start = np.full(int(ring.vertex.max()) + 1, -1, dtype=np.int64)
-    start[ring.vertex[corners]] = corners
-    first = start[vertices]
+    names, start = np.unique(ring.vertex, return_index=True)
+    first = start[np.searchsorted(names, vertices)]
     at, done = first, np.zeros(len(vertices), dtype=bool)
     sums = np.zeros((2, len(vertices)))
     creases, here = np.zeros(len(vertices), dtype=np.int64), np.arange(len(vertices))
@@ -175,9 +170,10 @@ def kawasaki_residual(ring: CornerRing, vertices: Ints, creased: Bools) -> Float
         sums[creases % 2, here] += np.where(done, 0.0, ring.angle[at])
         creases += ~done & creased[ring.edge[at]]
         at = np.where(done, at, ring.following[at])
-        done |= at == first
+        done = at == first
     odd = creases % 2 == 1
-    return np.where(creases == 0, 0.0, np.where(odd, np.pi, np.abs(sums[0] - np.pi)))
+    off = np.abs(sums - np.pi).max(axis=0)
+    return np.where(creases == 0, 0.0, np.where(odd, np.pi, off))
 
 
 def facet_planarity(pattern: CreasePattern, points: Floats) -> Floats:
@@ -214,8 +210,8 @@ def isometry(pattern: CreasePattern) -> Floats:
         folded = edge_lengths(pattern.folded_coords, ends)
         longer = np.maximum(flat, folded)
         sound = longer > DEGENERATE * mean
-        difference = np.where(sound, np.abs(flat - folded) / np.where(sound, longer, 1.0), 0.0)
-        worst[facets] = np.maximum(worst[facets], difference)
+        difference = np.abs(flat[sound] - folded[sound]) / longer[sound]
+        worst[facets[sound]] = np.maximum(worst[facets[sound]], difference)
     return worst
 
 
@@ -271,8 +267,7 @@ def dented_facets(pattern: CreasePattern) -> Ints:
     sides = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
     whole = np.sign(turns.sum(axis=1))[:, None]
     dented = (turns * whole < -DEGENERATE * sides[:, None] ** 2).any(axis=1)
-    dented[crossed_facets(pattern)] = False
-    return np.flatnonzero(dented)
+    return np.setdiff1d(np.flatnonzero(dented), crossed_facets(pattern))
 
 
 def _turn(a: Floats, b: Floats, c: Floats) -> Floats:

@@ -11,16 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-import numpy as np
-
 from miurafab.display import Shown
 from miurafab.findings import Finding, findings_json, refusals
-from miurafab.geometry.arrays import Floats, vector_product
-from miurafab.geometry.polygons import edge_lengths
-from miurafab.origami import invariants
+from miurafab.geometry.arrays import Floats
+from miurafab.geometry.polygons import edge_lengths, facet_areas
 from miurafab.origami.coverage import coverage
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.folding.contact import triangulate
 from miurafab.origami.judge_pattern import (
     Evidence,
     gather,
@@ -31,8 +27,6 @@ from miurafab.origami.judge_pattern import (
 from miurafab.origami.nearness import nearness
 from miurafab.origami.quality import Quality, quality
 from miurafab.surfaces.surface import TargetSurface
-
-EXACT, DEGENERATE = invariants.EXACT, invariants.DEGENERATE
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,9 +94,8 @@ class Measurements(Shown):
     def report(cls, measured: Measurements | None) -> dict[str, Any]:
         """The fields under the names of the fit report, each None where nothing was measured."""
         numbers = {f.name: getattr(measured, f.name, None) for f in fields(cls)}
-        shape = None if measured is None else measured.quality
-        if shape is not None and measured is not None:
-            numbers["quality"] = shape.as_json(measured.area_ratio)
+        if measured is not None and measured.quality is not None:
+            numbers["quality"] = measured.quality.as_json(measured.area_ratio)
         return numbers
 
 
@@ -234,8 +227,7 @@ def with_distances(
     if measured.hausdorff_mm is None:
         measured = with_nearness(measured, pattern, surface, tiles)
     cover = coverage(pattern, tiles)
-    a, b, c = pattern.folded_coords[triangulate(pattern.faces_vertices)[0]].transpose(1, 0, 2)
-    paper = float(np.linalg.norm(vector_product(b - a, c - a), axis=1).sum() / 2)
+    paper = float(facet_areas(pattern.folded_coords, pattern.faces_vertices).sum())
     return replace(
         measured,
         coverage=cover.covered,

@@ -24,8 +24,9 @@ from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cylinder import cylinder_over_polyline
 from miurafab.origami.formats.fold import read_fold, write_fold
+from miurafab.origami.invariants import EXACT
 from miurafab.origami.unfold import unfold
-from miurafab.origami.verify import EXACT, audit
+from miurafab.origami.verify import audit
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.job_directory import read_job
 from miurafab.workflow.manifest import read_manifest

@@ -14,8 +14,10 @@ from test_judge_pattern import strip
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import (
+    DEGENERATE,
     EXACT,
     angle_defect,
+    corner_angles,
     corner_ring,
     crossed_facets,
     dented_facets,
@@ -87,6 +89,14 @@ def test_alternate_sectors_run_from_crease_to_crease(
     assert np.degrees(found) == pytest.approx([residual], abs=1e-9)
 
 
+@pytest.mark.parametrize("sectors", [[60.0, 120.0, 60.0, 120.0], [120.0, 60.0, 120.0, 60.0]])
+def test_where_sectors_add_up_to_no_whole_turn_the_worse_sum_counts(sectors: list[float]) -> None:
+    """The cosine of a sector between spokes that rise by 45 degrees is (1 + cos d) / 2."""
+    pattern = wheel("MVMV", sectors, height=10.0)
+    small = 2 * math.acos((1 + math.cos(math.radians(60))) / 2)
+    assert residuals(pattern).flat_foldability == pytest.approx([math.pi - small])
+
+
 def test_several_vertices_are_walked_around_at_once() -> None:
     """Those with fewer corners wait for the others."""
     one, other = wheel("MVMV", [100.0, 80.0, 85.0, 95.0]), wheel("MFVMFV", [40, 50, 80, 60, 40, 90])
@@ -134,6 +144,29 @@ def test_a_corner_of_more_than_half_a_turn_has_its_whole_angle() -> None:
     assert ring.edge.tolist() == [3, 0, 1, 2]
 
 
+def test_places_past_the_last_corner_have_no_vertex_no_edge_and_no_angle() -> None:
+    """A square, and a triangle beside its second side."""
+    flat = np.array([[0, 0], [10, 0], [10, 10], [0, 10], [20, 5]], dtype=float)
+    pattern = CreasePattern(
+        flat,
+        np.array([[0, 1], [1, 2], [2, 3], [0, 3], [1, 4], [4, 2]]),
+        np.array([*"BVBBBB"]),
+        np.zeros(6),
+        np.array([[0, 1, 2, 3], [1, 4, 2, -1]]),
+    )
+    ring = corner_ring(pattern, np.pad(flat, ((0, 0), (0, 1))))
+    assert ring.vertex.tolist() == [0, 1, 2, 3, 1, 4, 2, -1]
+    assert ring.edge.tolist() == [3, 0, 1, 2, 1, 4, 5, -1]
+    assert ring.following.tolist() == [-1, -1, 6, -1, 1, -1, -1, -1]
+    low = math.degrees(math.atan(2))
+    right = [90.0] * 4 + [low, 180 - 2 * low, low, 0.0]
+    assert np.degrees(ring.angle) == pytest.approx(right)
+    angles = corner_angles(flat, pattern.faces_vertices)
+    assert np.degrees(angles.ravel()) == pytest.approx(right)
+    for other in (3 * flat, flat[:, ::-1] + 7.0):  # clockwise, too
+        assert corner_angles(other, pattern.faces_vertices) == pytest.approx(angles)
+
+
 def test_corners_follow_each_other_counter_clockwise() -> None:
     """Around the middle of a wheel, a corner is followed by that of the next triangle."""
     pattern = wheel("MVMV", [90.0] * 4)
@@ -164,6 +197,11 @@ def test_planarity_is_a_volume_over_a_cube() -> None:
     assert volume == pytest.approx(40.0, rel=1e-3)
 
 
+def test_a_triangle_is_flat_without_rounding() -> None:
+    for corners in np.random.default_rng(3).normal(size=(20, 3, 3)):
+        assert facet_planarity(facet(corners[:, :2], corners), corners).tolist() == [0.0]
+
+
 def test_isometry_compares_sides_and_diagonals() -> None:
     square = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
     whole = np.pad(square, ((0, 0), (0, 1)))
@@ -187,6 +225,29 @@ def test_a_side_that_is_degenerate_in_both_forms_is_left_out() -> None:
     assert isometry(facet(flat, folded)).max() < 1e-6
     folded[2, 1] = 3e-5  # that is no longer degenerate
     assert isometry(facet(flat, folded)) == pytest.approx([29 / 30])
+
+
+def test_a_side_is_degenerate_up_to_a_millionth_of_the_mean_edge_and_no_more() -> None:
+    folded = np.array([[0, 0, 0], [1, 0, 0], [5, 12, 0], [0, 12, 0.0]])
+    for _ in range(5):  # the mean has hardly any of the side
+        pattern = facet(folded[:, :2], folded)
+        short = DEGENERATE * edge_lengths(folded, pattern.edges_vertices).mean()
+        folded[1, 0] = short
+    flat = folded[:, :2].copy()
+    flat[1, 0] = 0.5 * short
+    sides = facet(flat, folded)
+    assert edge_lengths(folded, sides.edges_vertices)[0] == short
+    assert isometry(sides) == pytest.approx([0.0], abs=1e-6)
+    folded[1, 0] = math.nextafter(short, 1.0)
+    assert isometry(facet(flat, folded)) == pytest.approx([0.5])
+
+
+def test_a_corner_is_dented_by_more_than_a_millionth_of_the_longest_side() -> None:
+    """The longest side is 5, and the corner turns back by four times its height."""
+    height = 1e-6 * 25.0 / 4
+    for up, dented in ((height, []), (math.nextafter(height, 1.0), [0])):
+        for ring in ([[0, 0], [2, up], [4, 0], [0, 3]], [[0, 3], [4, 0], [2, up], [0, 0]]):
+            assert dented_facets(facet(np.array(ring))).tolist() == dented
 
 
 def test_what_counts_as_exact_grows_with_the_distance_from_the_origin() -> None:
@@ -251,13 +312,15 @@ SHAPES = {
     "star": (STAR, True, False),
     "pentagon, dented": ([[0, 0], [2, 1], [4, 0], [4, 4], [0, 4]], False, False),
     "triangle": ([[0, 0], [1, 0], [0, 1]], False, False),
+    "corner on a side": ([[0, 0], [4, 0], [4, 4], [2, 0], [0, 4]], False, False),
+    "side at a corner": ([[4, 4], [2, 0], [0, 4], [0, 0], [4, 0]], False, False),
 }
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_shapes_are_told_by_their_corners(name: str) -> None:
     corners, crossed, dented = SHAPES[name]
-    for size in (1.0, 50.0):
+    for size in (0.01, 1.0, 50.0):
         pattern = facet(size * np.array(corners, dtype=float))
         assert bool(len(crossed_facets(pattern))) is crossed
         assert bool(len(dented_facets(pattern))) is dented
@@ -276,6 +339,9 @@ def test_shapes_are_told_among_others() -> None:
     padded = np.pad(pattern.faces_vertices, ((0, 0), (0, 1)), constant_values=-1)
     assert crossed_facets(replace(crossed, faces_vertices=padded)).tolist() == [1, 2]
     # Where a cut leaves facets of any shape, no dent is told.
+    corner = replace(pattern, vertices_coords=dented, faces_vertices=pattern.faces_vertices.copy())
+    corner.faces_vertices[3, 3] = -1
+    assert dented_facets(corner).tolist() == []
     cut = replace(pattern, vertices_coords=dented, faces_vertices=padded)
     assert dented_facets(cut).tolist() == []
     assert dented_facets(cut).dtype == np.int64

@@ -12,11 +12,14 @@ from problems import CELL, fitted, regular
 from test_contact import fan, rolled
 
 from miurafab.errors import PatternError
+from miurafab.origami import verify
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.invariants import residuals
 from miurafab.origami.miura import regular_miura
+from miurafab.origami.nearness import Nearness
 from miurafab.origami.tessellation import Tessellation
 from miurafab.origami.unfold import unfold, with_angles_of_the_folded_form
-from miurafab.origami.verify import audit
+from miurafab.origami.verify import audit, measure, with_distances, with_nearness
 from miurafab.surfaces.catalogue import make_surface
 
 PROMISED = {
@@ -304,15 +307,22 @@ def test_the_report_names_what_the_fit_report_names():
     assert names <= set(audit(regular()).report())
 
 
-def test_a_flat_sheet_over_a_plane_is_measured_by_hand():
-    """Four squares of 50 mm that lie 1 mm over a plane of 100 x 100 mm."""
-    surface = make_surface("plane", {})[0]
-    scale = 100.0 / surface.domain.width
-    lowest = np.array([surface.domain.u0, surface.domain.v0]) * scale
+PLANE = make_surface("plane", {})[0]
+SIZE = 100.0 / PLANE.domain.width
+"""With it as scale, the plane is a square of 100 mm."""
+LOWEST = np.array([PLANE.domain.u0, PLANE.domain.v0]) * SIZE
+
+
+def over_the_plane(*, aside: float = 0.0, height: float = 1.0) -> CreasePattern:
+    """Four squares of 50 mm that lie ``height`` over the plane and ``aside`` from it."""
     grid = np.stack(np.meshgrid([0.0, 50.0, 100.0], [0.0, 50.0, 100.0]), axis=-1)
-    points = np.concatenate([grid + lowest, np.ones((3, 3, 1))], axis=2)
-    pattern = replace(unfold(Tessellation(points)), scale=scale)
-    found = audit(pattern, surface).measurements
+    flat = grid + LOWEST + np.array([aside, 0.0])
+    points = np.concatenate([flat, np.full((3, 3, 1), height)], axis=2)
+    return replace(unfold(Tessellation(points)), scale=SIZE)
+
+
+def test_a_flat_sheet_over_a_plane_is_measured_by_hand():
+    found = audit(over_the_plane(), PLANE).measurements
     assert found.sheet_to_target_mm == pytest.approx(1.0)
     assert found.target_to_sheet_mm == pytest.approx(1.0)
     assert found.hausdorff_midsurface_mm == pytest.approx(1.0)
@@ -321,6 +331,71 @@ def test_a_flat_sheet_over_a_plane_is_measured_by_hand():
     assert (found.coverage, found.overhang) == pytest.approx((1.0, 0.0))
     assert (found.facets, found.vertices, found.pieces, found.seam_mm) == (4, 9, 1, 0.0)
     assert found.min_edge_mm == pytest.approx(50.0)
+
+
+def test_each_distance_has_its_name(monkeypatch):
+    asked = []
+
+    def measured_so(*given):
+        asked.append(given)
+        return Nearness(
+            sheet_to_target=3.0, target_to_sheet=5.0, means_to_target=2.0, diagonal=20.0
+        )
+
+    monkeypatch.setattr(verify, "nearness", measured_so)
+    pattern, tiles = regular(3, 3), PLANE.tiles()
+    for given in ((), (tiles[:1],)):
+        found = with_nearness(measure(pattern), pattern, PLANE, *given)
+        assert (found.sheet_to_target_mm, found.target_to_sheet_mm) == (3.0, 5.0)
+        assert (found.hausdorff_mm, found.hausdorff_relative) == (5.0, 0.25)
+        assert (found.hausdorff_midsurface_mm, found.facets) == (2.0, 4)
+    assert [each[:2] for each in asked] == [(pattern, PLANE)] * 2
+    assert [len(each[2]) for each in asked] == [len(tiles), 1]
+
+
+def test_distances_that_are_known_are_not_measured_again():
+    known = replace(measure(over_the_plane()), hausdorff_mm=7.0)
+    found = with_distances(known, over_the_plane(aside=25.0), PLANE)
+    assert (found.hausdorff_mm, found.sheet_to_target_mm) == (7.0, None)
+    assert (found.coverage, found.overhang) == pytest.approx((0.75, 0.25), abs=0.01)
+    ridge = np.zeros((9, 3))
+    ridge[1::3, 2] = 37.5  # sides of 62.5 mm over 50
+    flat = over_the_plane()
+    roof = with_distances(known, replace(flat, folded_coords=flat.folded_coords + ridge), PLANE)
+    assert roof.area_ratio == pytest.approx(1.25)
+
+
+def test_the_paper_of_a_dented_facet_counts_once():
+    """A facet of the shape of an L, whose first corner does not see the others."""
+    ring = np.array([[100, 60], [60, 60], [60, 100], [0, 100], [0, 0], [100, 0]]) + LOWEST
+    corner = np.arange(6)
+    pattern = CreasePattern(
+        vertices_coords=ring,
+        edges_vertices=np.stack([corner, np.roll(corner, -1)], axis=1),
+        edges_assignment=np.full(6, "B"),
+        edges_fold_angle=np.zeros(6),
+        faces_vertices=corner[None],
+        folded_coords=np.pad(ring, ((0, 0), (0, 1))),
+        scale=SIZE,
+    )
+    known = replace(measure(pattern), hausdorff_mm=0.0)
+    found = with_distances(known, pattern, PLANE)
+    assert found.coverage == pytest.approx(0.84, abs=0.01)
+    assert found.area_ratio == pytest.approx(1.0)
+
+
+def test_what_is_measured_is_the_worst_of_each_kind():
+    pattern = regular()
+    rough = replace(pattern, folded_coords=moved(pattern.folded_coords, 31, 0.0, 0.0, 1e-3))
+    measured, found = measure(rough), residuals(rough)
+    assert measured.max_planarity == found.planarity.max() > 0
+    assert measured.max_developability == found.developability.max() > 0
+    assert measured.max_flat_foldability == found.flat_foldability.max() > 0
+    assert measured.max_isometry == found.isometry.max() > 0
+    exact = measure(regular(4, 2))  # no vertex is within the sheet
+    assert (exact.max_developability, exact.max_flat_foldability) == (0.0, 0.0)
+    assert measure(rolled(math.radians(58), 8)).self_intersections == 3
+    assert measure(fan(math.tau * 14 / 12, 14)).overlaps == 2
 
 
 def test_an_audit_is_shown_with_what_is_wrong():

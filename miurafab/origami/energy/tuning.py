@@ -31,15 +31,9 @@ from miurafab.origami.fitting.closeness import Closeness
 from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import INTERRUPTED, TIME_RAN_OUT, FitResult
 from miurafab.origami.fitting.scaling import scaled_residuals, worst_residual
+from miurafab.origami.invariants import DEGENERATE, EXACT
 from miurafab.origami.nearness import means_to_target
-from miurafab.origami.verify import (
-    DEGENERATE,
-    EXACT,
-    Measurements,
-    measure,
-    with_distances,
-    with_nearness,
-)
+from miurafab.origami.verify import Measurements, measure, with_distances, with_nearness
 
 CLOSE = 0.01
 """A barrier is what was asked within this part."""

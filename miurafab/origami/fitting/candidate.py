@@ -22,17 +22,10 @@ from miurafab.origami.fitting.request import FitRequest
 from miurafab.origami.fitting.result import Attempt
 from miurafab.origami.fitting.score import GOOD, Score, score
 from miurafab.origami.fitting.starts import Start
-from miurafab.origami.invariants import exactness
+from miurafab.origami.invariants import DEGENERATE, EXACT, exactness
 from miurafab.origami.judge_pattern import unlisted_seams
 from miurafab.origami.unfold import unfold_charts
-from miurafab.origami.verify import (
-    DEGENERATE,
-    EXACT,
-    Measurements,
-    measure,
-    with_distances,
-    with_nearness,
-)
+from miurafab.origami.verify import Measurements, measure, with_distances, with_nearness
 from miurafab.surfaces.outline import WholeMesh
 from miurafab.surfaces.surface import Swapped, TargetSurface
 

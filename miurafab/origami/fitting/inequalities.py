@@ -28,7 +28,7 @@ from miurafab.origami.fitting.blocks import (
 )
 from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.fitting.request import FitOptions
-from miurafab.origami.verify import EXACT
+from miurafab.origami.invariants import EXACT
 
 
 @dataclass(frozen=True, eq=False)

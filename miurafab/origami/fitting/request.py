@@ -22,7 +22,7 @@ from miurafab.options import (
 )
 from miurafab.origami.fitting.kinds import CutColumns, FlatFoldability, Pieces, Poles
 from miurafab.origami.fitting.nominal import Follow
-from miurafab.origami.verify import EXACT
+from miurafab.origami.invariants import EXACT
 from miurafab.surfaces.analytic import GeneralizedCylinder
 from miurafab.surfaces.mesh_repair import Holes
 from miurafab.surfaces.placement import Region

@@ -12,8 +12,8 @@ from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.fitting.inequalities import Bounds, limits
 from miurafab.origami.fitting.reduction import Unknowns
 from miurafab.origami.fitting.request import FitOptions
+from miurafab.origami.invariants import EXACT
 from miurafab.origami.miura import regular_miura
-from miurafab.origami.verify import EXACT
 
 SHEET = regular_miura(CELL, 4, 4)
 CHARTS = QuadCharts.of_cells(np.ones((3, 3), dtype=bool))
