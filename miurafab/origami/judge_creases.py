@@ -198,7 +198,7 @@ def _off_their_cells(pattern: CreasePattern, cells: Ints) -> Iterator[Finding]:
     inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
     one, other = pattern.edges_faces[inner].T
     piece = np.zeros(len(cells), dtype=np.int64) if pattern.pieces is None else pattern.pieces
-    low = np.full((int(piece.max()) + 1, 2), np.iinfo(np.int64).max)
+    low = np.full((pattern.pieces_count, 2), np.iinfo(np.int64).max)
     high = -low
     np.minimum.at(low, piece, cells)
     np.maximum.at(high, piece, cells)

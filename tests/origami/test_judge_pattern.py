@@ -18,7 +18,7 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import EXACT
 from miurafab.origami.judge_pattern import gather, judge_quality, proved, unlisted_seams
 from miurafab.origami.quality import Quality
-from miurafab.origami.verify import Measurements, audit, measure
+from miurafab.origami.verify import Audit, Measurements, audit, measure
 
 WITHOUT_FORM = (
     "Without a folded form it is not known whether the facets stay flat and keep clear of each "
@@ -206,6 +206,26 @@ def test_what_does_not_hold_says_how_much_and_where() -> None:
     assert not any("degenerate" in each for each in said(longer))
 
 
+def test_an_edge_is_degenerate_below_a_millionth_of_the_mean() -> None:
+    flat = np.array([[0, 0], [1, 0], [10, 10], [0, 10.0]])
+    pattern = replace(two_squares(), folded_coords=None, pieces=None)
+    for _ in range(5):  # the mean has hardly any of the edge
+        flat[1, 0] = 1e-6 * edge_lengths(flat, pattern.edges_vertices[:4]).mean()
+    ring = replace(
+        pattern,
+        vertices_coords=flat,
+        edges_vertices=pattern.edges_vertices[:4],
+        edges_assignment=np.full(4, "B"),
+        edges_fold_angle=np.zeros(4),
+        faces_vertices=pattern.faces_vertices[:1],
+    )
+    shorter = flat.copy()
+    shorter[1, 0] = math.nextafter(flat[1, 0], 0.0)
+    assert not any("degenerate" in each for each in said(ring))
+    told = said(replace(ring, vertices_coords=shorter))
+    assert sum("degenerate-edge: Edge 0 is" in each for each in told) == 1
+
+
 def test_a_seam_that_gapes_says_how_far() -> None:
     pattern = two_pieces()
     second = np.unique(pattern.faces_vertices[pattern.pieces == 1])
@@ -356,6 +376,11 @@ def folding_by(degrees: float) -> Quality:
         ({}, ""),
         ({"quality": folding_by(165.0)}, ""),
         (
+            {"quality": folding_by(165.001)},
+            "steep-folds: Creases fold by up to 165 degrees, and facets nearly lie on each other "
+            "there.",
+        ),
+        (
             {"quality": folding_by(170.0)},
             "steep-folds: Creases fold by up to 170 degrees, and facets nearly lie on each other "
             "there.",
@@ -423,6 +448,14 @@ def test_a_report_has_status_advice_and_what_is_proved() -> None:
     assert Measurements.report(None).keys() == Measurements.report(measure(regular())).keys()
     flat = Measurements.report(measure(replace(regular(), folded_coords=None)))
     assert (flat["facets"], flat["quality"], flat["max_isometry"]) == (48, None, None)
+
+
+def test_what_was_not_measured_is_none() -> None:
+    numbers = vars(measured())
+    told = {"facets": 1, "vertices": 4, "min_edge_mm": 1.0, "overlaps": 0}
+    told |= {"pieces": 1, "seam_mm": 0.0}
+    assert numbers == dict.fromkeys(numbers) | told
+    assert Audit(measured(), (), 0.0).proved == ()
 
 
 def test_a_value_shows_what_is_not_as_usual_and_a_notebook_all() -> None:

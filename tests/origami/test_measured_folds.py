@@ -14,7 +14,12 @@ from test_judge_pattern import strip
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import EXACT, residuals
-from miurafab.origami.judge_creases import judge_creases, measured_folds, unmeasured
+from miurafab.origami.judge_creases import (
+    MeasuredFolds,
+    judge_creases,
+    measured_folds,
+    unmeasured,
+)
 from miurafab.origami.unfold import FLAT_ANGLE
 
 HINGE = 3
@@ -84,6 +89,36 @@ def test_near_half_a_turn_the_sign_is_not_known() -> None:
     (told,) = unmeasured(measured_folds(closed, residuals(closed)), closed)
     assert told.where == (3, 5)
     assert told.sentence.startswith("2 edges fold by 180 degrees, where the folded form does not")
+
+
+def measured(angle: float, within: float) -> MeasuredFolds:
+    """The fold of the hinge alone, as if it were measured so."""
+    folds = np.full((2, 7), np.nan)
+    folds[:, HINGE] = angle, within
+    return MeasuredFolds(*folds)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_fold_within_what_is_known_is_none(sign: int) -> None:
+    pattern, half = hinge(0.0), 0.5 * sign
+    for within, codes in ((0.5, []), (math.nextafter(0.5, 0), ["assignment", "fold-angle"])):
+        found = list(judge_creases(pattern, measured(half, within)))
+        assert [each.code for each in found] == codes
+        told = list(judge_creases(lettered(pattern, "V", half), measured(half, within)))
+        assert (told == []) is (sign > 0)  # -0.5 is no valley
+    least = math.pi - 0.5
+    for angle, signed in ((least, False), (math.nextafter(least, 0), True)):
+        folds = measured(sign * angle, 0.5)
+        assert bool(folds.signed[HINGE]) is signed
+        letter = "V" if sign > 0 else "M"
+        sided = lettered(pattern, letter, sign * angle)
+        assert list(judge_creases(sided, folds)) == []
+        other = lettered(pattern, "M" if sign > 0 else "V", -sign * angle)
+        codes = [each.code for each in judge_creases(other, folds)]
+        assert codes == (["assignment", "fold-angle"] if signed else ["fold-angle"])
+    assert np.flatnonzero(folds.known).tolist() == [HINGE]
+    assert not measured(1.0, math.inf).known.any()
+    assert not measured(math.nan, 1.0).known.any()
 
 
 def test_where_a_facet_has_no_area_no_fold_is_measured() -> None:
@@ -289,6 +324,28 @@ def test_an_edge_that_is_there_twice_is_told_once_with_its_letters() -> None:
     }
 
 
+def test_edges_and_facets_of_one_fault_are_counted_as_such() -> None:
+    pattern = replace(hinge(0.0), folded_coords=None)
+    count = len(pattern.edges_vertices)
+    for more, code in (
+        (pattern.edges_vertices[[0, HINGE]], "double-edge"),
+        ([[0, 2], [0, 5]], "facets"),
+    ):
+        two = replace(
+            pattern,
+            edges_vertices=np.append(pattern.edges_vertices, more, axis=0),
+            edges_assignment=np.append(pattern.edges_assignment, ["M", "M"]),
+            edges_fold_angle=np.append(pattern.edges_fold_angle, [0.0, 0.0]),
+        )
+        ((where, sentence),) = [each[1:] for each in said(two, form=False) if each[0] == code]
+        assert where == (count, count + 1)
+        assert sentence.endswith(f" The same kind of fault is at 1 more edge ({count + 1}).")
+    over = replace(pattern, vertices_coords=pattern.vertices_coords * [-1.0, 1.0])
+    ((code, where, sentence),) = said(over, form=False)
+    assert (code, where) == ("turned-over", (0, 1))
+    assert sentence.endswith(" The same kind of fault is at 1 more facet (1).")
+
+
 def test_an_edge_of_no_facet_is_told_unless_it_is_flat() -> None:
     pattern = replace(hinge(0.0), folded_coords=None)
     edges = np.append(pattern.edges_vertices, [[0, 2]], axis=0)
@@ -316,8 +373,9 @@ def test_facets_that_are_not_those_of_the_grid_are_named() -> None:
     pattern = replace(regular(4, 3), folded_coords=None)
     swapped = replace(pattern, grid=(3, 4))
     (found,) = [each for each in said(swapped, form=False) if each[0] == "facets"]
-    assert found[2].startswith(
-        "Facet 0 is no cell of the grid of 3 x 4 vertices. The same kind of "
+    assert found[2] == (
+        "Facet 0 is no cell of the grid of 3 x 4 vertices. The same kind of fault is at 5 more "
+        "facets (1, 2, 3, 4, ...)."
     )
     assert found[1] == (0, 1, 2, 3, 4, 5)
     fewer = replace(pattern, faces_vertices=pattern.faces_vertices[:-1])
@@ -367,6 +425,25 @@ def test_neighbours_whose_cells_lie_apart_are_named() -> None:
     assert [each[1] for each in said(replace(pattern, cells=diagonal), form=False)] == [
         tuple(inner.tolist())
     ]
+
+
+def test_two_rings_close_each_on_itself() -> None:
+    """Columns run 2 3 0 1 in the one, and 102 103 100 101 in the other."""
+    one = replace(strip(np.zeros(5)), folded_coords=None)
+    count = len(one.vertices_coords)
+    column = np.column_stack([np.roll(np.arange(4), 2), np.zeros(4, dtype=np.int64)])
+    both = replace(
+        one,
+        vertices_coords=np.append(one.vertices_coords, one.vertices_coords + 100, axis=0),
+        edges_vertices=np.append(one.edges_vertices, one.edges_vertices + count, axis=0),
+        edges_assignment=np.tile(one.edges_assignment, 2),
+        edges_fold_angle=np.tile(one.edges_fold_angle, 2),
+        faces_vertices=np.append(one.faces_vertices, one.faces_vertices + count, axis=0),
+        cells=np.append(column, column + 100, axis=0),
+        pieces=np.repeat([0, 1], 4),
+    )
+    assert said(both, form=False) == []
+    assert [each[0] for each in said(replace(both, pieces=None), form=False)] == ["facets"]
 
 
 def test_each_piece_closes_on_itself() -> None:

@@ -15,7 +15,7 @@ from miurafab.fabrication.strokes import RIM, SLOT
 from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.job import Job
 from miurafab.gcode.reading import read_program
-from miurafab.profiles import OPERATIONS, Material, load_machine, load_material
+from miurafab.profiles import OPERATIONS, MachineProfile, Material, load_machine, load_material
 from miurafab.workflow.trace import traced_strokes
 
 LASER, CARD = load_machine("grbl-laser-400"), load_material("card-250")
@@ -61,11 +61,18 @@ def burnt(name: str, points: Sequence[tuple[float, float]], z: float | None = No
 
 
 def found(
-    strokes: Sequence[Stroke], text: str, *, material: Material = CARD, machine: str = ""
+    strokes: Sequence[Stroke],
+    text: str,
+    *,
+    material: Material = CARD,
+    profile: MachineProfile = LASER,
 ) -> tuple[list[str], Counter[str]]:
     """The sentences on a program that begins with arming the beam, and what it has right."""
-    profile = load_machine(machine) if machine else LASER
-    program = read_program(Job("sheet-01.nc", f"M4 S0\n{text}M5\n"), profile)
+    if profile.dialect == "hpgl":
+        job = Job("sheet-01.plt", f"IN;{text}SP0;")
+    else:
+        job = Job("sheet-01.nc", f"M4 S0\n{text}M5\n")
+    program = read_program(job, profile)
     traced: Counter[str] = Counter()
     findings = traced_strokes(
         wanted(strokes), PATTERN, np.array([FOLD]), program, profile, material, traced
@@ -142,6 +149,69 @@ def test_a_stroke_out_of_its_place_by_more_than_rounding_is_named(
     says, traced = found([dash(10)], burnt("perforate", moved))
     assert len(says) == (0 if right else 2)
     assert traced["crease"] == right
+
+
+def pivoting(name: str) -> MachineProfile:
+    """A drag knife whose tip is on its axis, and which cuts no corner over again."""
+    machine = load_machine(name)
+    knife = replace(machine.tool.knife, offset_mm=0.0, overcut_mm=0.0)
+    return replace(machine, tool=replace(machine.tool, knife=knife))
+
+
+KNIFE, CUTTER = pivoting("grbl-knife-a3"), pivoting("hpgl-cutter-a3")
+
+
+@pytest.mark.parametrize(
+    ("profile", "shift", "right"),
+    [
+        (LASER, 0.0039, True),
+        (LASER, 0.0041, False),
+        (KNIFE, 0.0099, True),
+        (KNIFE, 0.0101, False),
+        (CUTTER, 0.05, True),
+        (CUTTER, 0.075, False),
+    ],
+)
+def test_an_end_may_be_out_of_its_place_by_twice_what_the_machine_rounds(
+    profile: MachineProfile, shift: float, right: bool
+) -> None:
+    (a, b), (c, d) = dash(10)[1]
+    text = burnt("perforate", [(a + shift, b), (c, d)])
+    if profile is CUTTER:
+        text = f"PU{(a + shift) * 40:g},{b * 40:g};PD{c * 40:g},{d * 40:g};PU0,0;"
+    says, traced = found([dash(10)], text, profile=profile)
+    assert len(says) == (0 if right else 2)
+    assert traced["crease"] == right
+
+
+def test_a_knife_turns_round_at_corners_by_segments_of_its_own() -> None:
+    for gap, swivels in ((0.015, True), (0.025, False)):
+        strokes, swivel = [dash(10), dash(12 + gap)], [(12, 10), (12 + gap, 10)]
+        ways = [strokes[0][1], strokes[1][1], swivel]
+        text = "".join(f"M3 S0\n{burnt('perforate', way)}" for way in ways)
+        assert (found(strokes, text, profile=KNIFE)[0] == []) is swivels
+        assert len(found(strokes, text)[0]) == 1  # a laser does not
+
+
+@pytest.mark.parametrize(
+    ("profile", "step", "may"),
+    [
+        (LASER, 0.002, True),
+        (LASER, 0.0021, False),
+        (KNIFE, 0.0199, True),
+        (KNIFE, 0.0201, False),
+    ],
+)
+def test_what_is_no_longer_than_what_a_machine_loses_may_vanish(
+    profile: MachineProfile, step: float, may: bool
+) -> None:
+    """The short segment comes first: without it, the second begins where it did."""
+    points = [(0.0, 10.0), (step, 10.0), (2.0, 10.0)]
+    stroke = ("perforate", points, CREASE, 0)
+    for first in (0, 1):
+        says, traced = found([stroke], burnt("perforate", points[first:]), profile=profile)
+        assert (says == []) is (may or not first)
+        assert bool(traced) is (may or not first)
 
 
 def test_a_stroke_that_is_burnt_twice_is_named_once_and_is_not_right() -> None:
