@@ -21,6 +21,7 @@ from miurafab.origami.energy.bar_hinge import BarHingeModel
 from miurafab.origami.energy.continuation import HISTORY, Known, extrapolate, follow
 from miurafab.origami.energy.equilibrium import (
     MAX_ITERATIONS,
+    ROUNDINGS,
     Balance,
     EquilibriumState,
     Factored,
@@ -33,6 +34,7 @@ from miurafab.origami.energy.ramp import (
     Ramped,
     descend,
     nearing,
+    raised_diagonal,
     softest_moves,
 )
 from miurafab.origami.energy.touch_pairs import REACH, NearPairs
@@ -331,5 +333,11 @@ def _frame(balance: Ramped, known: Known, stiff: bool) -> RampFrame:
 
 
 def unstable_directions(balance: Balance, state: EquilibriumState, target: float) -> int:
-    """The number of directions in which the energy falls from a ``state`` in balance."""
-    return negative_pivots(balance.factor(state, target).k)
+    """The number of directions in which the energy falls from a ``state`` in balance.
+
+    Loose facets move without force, and in such a direction the energy does not fall: the diagonal
+    of K is raised by its rounding, so that an eigenvalue of 0 counts as none below it.
+    """
+    matrix = balance.stiffness(state, target)
+    rounding = ROUNDINGS * np.finfo(np.float64).eps * np.abs(matrix.data).max(initial=0.0)
+    return negative_pivots(balance.factored(raised_diagonal(matrix, float(rounding))))

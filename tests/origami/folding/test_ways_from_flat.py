@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -149,3 +150,25 @@ def test_a_stiff_shape_that_is_not_found_is_looked_for_with_less_patience(
     _, verdict = ramp_motion(named_patterns.waterbomb_base(), 7)
     assert verdict.complete
     assert given == [25, 12, 8, 8, 8, 25, 12]
+
+
+def test_facets_that_move_without_force_make_no_position_unstable() -> None:
+    """Six free creases meet in the middle of a hexagon, which so has three mechanisms: as many
+    eigenvalues are 0, and rounding gives each a sign. Two flaps fold beside it.
+    """
+    rim = [(math.cos(turn), math.sin(turn)) for turn in np.radians([0, 60, 120, 180, 240, 300])]
+    lines = [((0.0, 0.0), corner, "U", 0.0) for corner in rim]
+    for side, (one, other) in enumerate(zip(rim, rim[1:] + rim[:1], strict=True)):
+        if side % 3:
+            lines.append((one, other, "B", 0.0))
+            continue
+        out = (one[0] + other[0], one[1] + other[1])
+        far = [(end[0] + out[0], end[1] + out[1]) for end in (one, other)]
+        lines += [(one, other, "V", 65.0), (one, far[0], "B", 0.0)]
+        lines += [(far[0], far[1], "B", 0.0), (far[1], other, "B", 0.0)]
+    found = find_motion(named_patterns.drawn(lines), 10)
+    assert found.verdict is not None
+    assert found.verdict.unstable.tolist() == [0] * 11
+    assert found.motion.is_rigid
+    flaps = found.motion.pattern.edges_assignment == "V"
+    assert np.degrees(found.motion.fold_angles[-1][flaps]) == pytest.approx([65, 65])
