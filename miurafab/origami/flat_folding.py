@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from miurafab.findings import Finding, counted
-from miurafab.geometry.arrays import Floats
+from miurafab.geometry.arrays import Bools, Floats
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import CornerRing, corner_ring, interior_vertices
 
@@ -62,11 +62,14 @@ class VertexFolds:
         The angle between each crease and the next, radians.
     angles : (n,) float64
         The fold angle of each crease, radians.
+    mountain : (n,) bool
+        Whether each crease is a mountain by its letter: a fold angle of 0 does not tell.
     """
 
     vertex: int
     sectors: Floats
     angles: Floats
+    mountain: Bools
 
     @property
     def gap(self) -> float:
@@ -96,7 +99,7 @@ class VertexFolds:
                 f"the sums of alternate sectors are {one:.{digits}g} and {other:.{digits}g} "
                 "degrees, and must be equal (Kawasaki)"
             )
-        mountains = int((self.angles < 0).sum())
+        mountains = int(self.mountain.sum())
         if abs(2 * mountains - count) != 2:
             return (
                 f"{mountains} mountains and {count - mountains} valleys meet there, and the "
@@ -118,8 +121,8 @@ class VertexFolds:
                 last += 1
             if self.sectors[(last + 1) % count] < self.sectors[first]:
                 continue
-            creases = self.angles[np.arange(first - 1, last + 1) % count]
-            if abs(int(np.sign(creases).sum())) != len(creases) % 2:
+            creases = self.mountain[np.arange(first - 1, last + 1) % count]
+            if abs(2 * int(creases.sum()) - len(creases)) != len(creases) % 2:
                 return True
         return False
 
@@ -147,7 +150,10 @@ def vertex_folds(pattern: CreasePattern) -> tuple[list[VertexFolds], int]:
         # A sector runs from one folding crease to the next.
         places = np.cumsum(ring.angle[around])
         sectors = np.diff(places[folding], append=places[-1] + places[folding[0]])
-        judged.append(VertexFolds(vertex, np.roll(sectors, 1), angles[edge[folding]]))
+        creases = edge[folding]
+        judged.append(
+            VertexFolds(vertex, np.roll(sectors, 1), angles[creases], letters[creases] == "M")
+        )
     return judged, left_out
 
 

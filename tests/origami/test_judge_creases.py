@@ -325,6 +325,8 @@ def test_folds_that_are_all_given_as_0_degrees_prove_nothing() -> None:
     still = replace(pattern, edges_fold_angle=np.zeros(len(pattern.edges_vertices)))
     said = [each.sentence for each in audit(still).findings if each.code == "not-proven"]
     assert "The file gives every fold as 0 degrees, so no size is known." in said
+    told = [each.sentence for each in audit(still).findings if each.code == "not-flat-foldable"]
+    assert told == []  # by its letters every vertex has three of one kind and one of the other
 
 
 def test_beside_a_facet_without_area_no_fold_is_measured() -> None:

@@ -53,6 +53,7 @@ from miurafab.origami.formats.fold_keys import (
     frames_in,
     numbers_at,
     points_at,
+    told_without_sizes,
     unit_mm,
 )
 from miurafab.origami.formats.fold_states import (
@@ -272,6 +273,9 @@ def parse_fold(document: Any) -> CreasePattern:
     if pattern.folded_coords is not None:
         own = np.isfinite(fold_angles_in(key, assignment, np.nan))
         pattern = with_angles_of_the_folded_form(pattern, own)
+    unsized = told_without_sizes(key, assignment)
+    if unsized and pattern.folded_coords is None:
+        pattern = replace(pattern, angles_assumed=True, told=(*pattern.told, *unsized))
     further = sum("foldedForm" in classes_of(frame) for frame in frames) > 1
     return pattern if further else _without_loose_vertices(pattern)
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
+from miurafab.findings import Finding
 from miurafab.geometry.arrays import Floats, Ints
 from miurafab.origami.crease_pattern import ASSIGNMENTS
 
@@ -129,6 +130,9 @@ def fold_angles_in(
 ) -> Floats:
     """The file's angles in radians. An angle that the file lacks is ``missing``, and without that
     -pi for a mountain, pi for a valley and 0 for others.
+
+    A file lacks them too that gives every mountain and every valley as 0: some programs write the
+    flat state of a sheet, and its letters tell what folds.
     """
     flat_folded = np.select([assignment == "M", assignment == "V"], [-180.0, 180.0], 0.0)
     if missing is not None:
@@ -142,7 +146,24 @@ def fold_angles_in(
         angles = np.array([math.nan if a is None else a for a in given], dtype=np.float64)
     except (ValueError, TypeError):
         raise PatternError("'edges_foldAngle' holds something that is not a number.") from None
+    folds = np.isin(assignment, ("M", "V"))
+    if not np.nan_to_num(angles[folds]).any():
+        angles[folds] = math.nan
     return np.radians(np.where(np.isnan(angles), flat_folded, angles))
+
+
+def told_without_sizes(
+    document: Mapping[str, Any], assignment: NDArray[np.str_]
+) -> tuple[Finding, ...]:
+    """The finding on a file whose angles are there, and tell of no mountain or valley how far it
+    folds.
+    """
+    folds = np.isin(assignment, ("M", "V"))
+    known = np.isfinite(fold_angles_in(document, assignment, math.nan)[folds]).any()
+    if known or not folds.any() or document.get("edges_foldAngle") is None:
+        return ()
+    says = "The file gives every fold as 0 degrees, so no size is known."
+    return (Finding("not-proven", says),)
 
 
 def edges_in(document: Mapping[str, Any]) -> Ints:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from named_patterns import waterbomb_base
 from piece_problems import gores, trimmed, two_pieces, two_trimmed_pieces
 from problems import CELL, fitted, regular
 
@@ -19,9 +20,12 @@ from miurafab.errors import PatternError
 from miurafab.geometry.quads import QuadCharts
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.kinematics import rigid_motion, states_between
+from miurafab.origami.formats.files import load
 from miurafab.origami.formats.fold import fold_text, parse_fold, read_fold, write_fold
 from miurafab.origami.miura import regular_miura
 from miurafab.origami.unfold import unfold_charts
+from miurafab.workflow.layers import layers
+from miurafab.workflow.patterns import check
 
 
 def document(pattern: CreasePattern | None = None) -> dict[str, Any]:
@@ -304,3 +308,29 @@ def test_an_angle_that_is_null_is_that_of_the_folded_form() -> None:
     given = {**document, "edges_foldAngle": [0, 0, 0, 0, 90]}
     kept = parse_fold({**given, "file_frames": [{**document, **form}]})
     assert kept.edges_assignment[4] == "M"  # as the file says, which a check finds
+
+
+def test_folds_that_are_all_given_as_0_degrees_fold_by_their_letters(tmp_path: Path) -> None:
+    """A check called every crease a valley, the layers were those of the unfolded sheet, and
+    nothing folded.
+    """
+    known = json.loads(fold_text(waterbomb_base()))
+    still = {**known, "edges_foldAngle": [0] * len(known["edges_vertices"])}
+    del known["edges_foldAngle"]
+    files = [tmp_path / "still.fold", tmp_path / "known.fold"]
+    for file, content in zip(files, (still, known), strict=True):
+        file.write_text(json.dumps(content))
+    found, meant = map(load, files)
+    assert np.array_equal(found.edges_fold_angle, meant.edges_fold_angle)
+    assert found.angles_assumed
+    said = [each.sentence for each in check(files[0]).findings]
+    assert said[0] == "The file gives every fold as 0 degrees, so no size is known."
+    assert not [sentence for sentence in said if "fold flat" in sentence]
+    order, other = (layers(file).order for file in files)
+    assert order is not None
+    assert other is not None
+    assert order.known
+    assert np.array_equal(order.above, other.above)
+    half = {**still, "edges_foldAngle": [0.0] * len(still["edges_vertices"])}
+    half["edges_foldAngle"][half["edges_assignment"].index("M")] = -10.0
+    assert np.degrees(parse_fold(half).edges_fold_angle) == pytest.approx(half["edges_foldAngle"])
