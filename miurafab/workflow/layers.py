@@ -77,7 +77,10 @@ class Layers(Shown):
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What a person should know about the order."""
-        findings = self.told + (() if self.closed is None else layer_findings(self.closed))
+        of_motion = () if self.closed is None else layer_findings(self.closed)
+        if self.search is not None:  # which decides what does not follow from the motion
+            of_motion = tuple(each for each in of_motion if each.code != "undecided-layers")
+        findings = self.told + of_motion
         if self.search is not None and not self.search.orders:
             sentence = (
                 "The pattern cannot fold flat with these mountains and valleys: no order of its "

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flat_folds import flaps, grid, pattern_of, strip
+from named_patterns import border, drawn
 from problems import fitted, regular
 
 from miurafab.errors import InputError, PatternError
@@ -267,6 +268,18 @@ def test_no_order_is_claimed_for_what_does_not_fold_flat(tmp_path: Path) -> None
     bent[len(bent) // 2] += 0.5
     with pytest.raises(PatternError, match="does not fold"):
         search_layer_orders(replace(regular(), vertices_coords=bent, folded_coords=None))
+
+
+def test_a_search_is_not_advised_after_it_was_made() -> None:
+    """Eight creases, mountains and valleys in turn, fold flat in no order of their layers."""
+    turns = np.radians(np.arange(0, 360, 45))
+    ends = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    creases = [
+        ((0.0, 0.0), (*end,), letter, 180.0) for end, letter in zip(ends, "MV" * 4, strict=True)
+    ]
+    found = layers(drawn([*creases, *border(*ends)]))
+    assert (found.exists, found.search.complete) == (False, True)
+    assert [finding.code for finding in found.findings] == ["cannot-fold-flat"]
 
 
 def test_more_layers_than_can_be_searched_are_refused_by_their_number(
