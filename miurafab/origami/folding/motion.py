@@ -29,6 +29,7 @@ from miurafab.origami.energy.ruled import is_ruled
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.certificate import RigidCertificate, certified
+from miurafab.origami.folding.first_order import refuse_locked
 from miurafab.origami.folding.flat_edges import without_flat_edges
 from miurafab.origami.folding.kinematics import (
     FoldingMotion,
@@ -117,6 +118,7 @@ def _find(pattern: CreasePattern, steps: int, on_progress: Progress | None) -> F
 def _from_flat(
     pattern: CreasePattern, steps: int, mismatch: float | None, on_progress: Progress | None
 ) -> FoundMotion:
+    refuse_locked(pattern)
     softness = SOFTNESS
     most = MOST_AGAIN // len(pattern.vertices_coords)
     again = steps <= most

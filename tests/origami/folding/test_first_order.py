@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import named_patterns
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
 from miurafab.errors import PatternError
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.folding import first_order, motion
 from miurafab.origami.folding.first_order import waiting_folds
 from miurafab.origami.folding.motion import find_motion
 
@@ -79,3 +82,85 @@ def test_at_one_vertex_the_program_is_what_a_search_finds(seed: int, count: int)
     low = np.array(tips).min(axis=0)  # the drawing is moved into the first quadrant
     found = middles(pattern, waiting_folds(pattern))
     assert {(round(x + low[0], 6), round(y + low[1], 6)) for x, y in found} == waiting
+
+
+def program_alone(pattern: CreasePattern) -> set[int]:
+    """The folds that wait by the whole program, in other words: each by itself shall turn."""
+    letters, ends = pattern.edges_assignment, pattern.edges_vertices
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    folds = [e for e in np.flatnonzero(inner) if letters[e] in "MVU"]
+    rim = set(ends[~inner].ravel().tolist())
+    rows = [v for v in range(len(pattern.vertices_coords)) if v not in rim]
+    turns = np.zeros((2 * len(rows), len(folds)))
+    for column, edge in enumerate(folds):
+        for one, other in (ends[edge], ends[edge][::-1]):
+            if one in rows:
+                along = pattern.vertices_coords[other] - pattern.vertices_coords[one]
+                at = 2 * rows.index(one)
+                turns[at : at + 2, column] = along / np.linalg.norm(along)
+    side = {"M": (None, 0), "V": (0, None), "U": (None, None)}
+    waiting = set()
+    for column, edge in enumerate(folds):
+        if letters[edge] == "U":
+            continue
+        bounds: list[Any] = [side[letters[e]] for e in folds]
+        bounds[column] = (1, 1) if letters[edge] == "V" else (-1, -1)
+        found = linprog(np.zeros(len(folds)), A_eq=turns, b_eq=np.zeros(len(turns)), bounds=bounds)
+        if found.status != 0:
+            waiting.add(int(edge))
+    return waiting
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), across=st.integers(2, 4))
+def test_what_rests_at_a_vertex_lets_its_neighbours_rest(seed: int, across: int) -> None:
+    """Against one program for each fold, on grids with diagonals and letters at random."""
+    random = np.random.default_rng(seed)
+    n = float(across)
+    lines = named_patterns.border((0.0, 0.0), (n, 0.0), (n, n), (0.0, n))
+    for x in range(across):
+        for y in range(across):
+            ways = [((x, y), (x + 1, y + 1))] if random.random() < 0.7 else []
+            ways += [((x, y), (x + 1, y))] if y else []
+            ways += [((x, y), (x, y + 1))] if x else []
+            for one, other in ways:
+                letter = random.choice(["M", "V", "U"], p=[0.45, 0.45, 0.1])
+                lines.append(
+                    ((float(one[0]), float(one[1])), tuple(map(float, other)), letter, 90.0)
+                )
+    pattern = named_patterns.drawn(lines)
+    assert set(waiting_folds(pattern).tolist()) == program_alone(pattern)
+
+
+def test_opposite_folds_of_one_letter_turn_and_those_across_them_do_not() -> None:
+    """Three of the letters and one other: the line of two equal ones turns alone."""
+    assert len(waiting_folds(cross("VVVM"))) == 2
+    assert len(waiting_folds(cross("VVVV"))) == 0
+    assert len(waiting_folds(cross("VVMM"))) == 4
+
+
+def cross(letters: str) -> CreasePattern:
+    """Two lines that cross, their four halves of ``letters``, going round."""
+    lines = named_patterns.border((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
+    tips = ((2.0, 1.0), (1.0, 2.0), (0.0, 1.0), (1.0, 0.0))
+    lines += [((1.0, 1.0), tip, letter, 90.0) for tip, letter in zip(tips, letters, strict=True)]
+    return named_patterns.drawn(lines)
+
+
+def test_a_program_without_an_answer_tells_what_waits_at_single_vertices(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pattern = folded_map("VVVVVVVMVVMV")
+    whole = waiting_folds(pattern)
+    monkeypatch.setattr(first_order, "MOST_PIVOTS", 0)
+    assert set(waiting_folds(pattern)) <= set(whole)
+
+
+def test_a_large_sheet_whose_folds_wait_is_refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before anything is solved; a sheet of as many vertices whose folds begin is folded."""
+    monkeypatch.setattr(first_order, "MOST_BENT", 10)
+    with monkeypatch.context() as patch:
+        patch.setattr(motion, "ramp_motion", None)
+        with pytest.raises(PatternError, match=r"flat facets 6 of its 12 folds .* \(it has 16\)"):
+            find_motion(folded_map("VVVVVVVMVVMV"), 4)
+    assert len(find_motion(named_patterns.miura(4), 4).motion.frames) == 5
