@@ -22,6 +22,8 @@ end, and so on.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from scipy.sparse import coo_array, eye_array, hstack
 
@@ -40,8 +42,8 @@ SLACK = 1e-5
 """What may be left of the sum around a vertex, where one fold turns by 1: drawings are rounded, and
 without it the program finds no answer for some of them."""
 MOST_PIVOTS = 20_000
-"""The most steps of the program, which take half a minute. If they are not enough, only those folds
-are told that wait for what is around single vertices."""
+"""The most steps of the program. If they are not enough, only those folds are told that wait for
+what is around single vertices."""
 
 
 def waiting_folds(pattern: CreasePattern) -> Ints:
@@ -49,59 +51,50 @@ def waiting_folds(pattern: CreasePattern) -> Ints:
 
     Edges of letter U turn to either side.
     """
-    inner = (pattern.edges_faces >= 0).all(axis=1)
-    sign = np.select([pattern.edges_assignment == "M", pattern.edges_assignment == "V"], [-1, 1], 0)
-    folds = np.flatnonzero(inner & (sign != 0))
-    free = np.flatnonzero(inner & (pattern.edges_assignment == "U"))
-    vertices = interior_vertices(pattern)
-    if not len(folds) or not len(vertices):
-        return np.empty(0, dtype=np.int64)
-    row = np.full(len(pattern.vertices_coords), -1, dtype=np.int64)
-    row[vertices] = np.arange(len(vertices))
-    ends = pattern.edges_vertices
-    along = pattern.vertices_coords[ends[:, 1]] - pattern.vertices_coords[ends[:, 0]]
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    edge, end = np.nonzero(row[ends] >= 0)
-    away = np.where(end == 0, 1.0, -1.0)[:, None] * along[edge]
-    at = row[ends[edge, end]]
-    rests = _rests_at_vertices(edge, at, away, np.where(inner, sign, 0), free)
+    ends = _ends_inside(pattern)
+    folds, free, rests = ends.folds, ends.free, _rests_at_vertices(ends)
     waiting, folds, free = folds[rests[folds]], folds[~rests[folds]], free[~rests[free]]
-    if not len(folds):
+    rows = 2 * ends.vertices
+    if not len(folds) or not rows:
         return waiting
-    entries = (away.T.ravel(), (np.concatenate([at, at + len(vertices)]), np.tile(edge, 2)))
-    turns = coo_array(entries, shape=(2 * len(vertices), len(ends))).tocsc()
-    signed = turns[:, folds] * sign[folds]
+    places = np.concatenate([ends.at, ends.at + ends.vertices])
+    entries = (ends.away.T.ravel(), (places, np.tile(ends.edge, 2)))
+    turns = coo_array(entries, shape=(rows, len(ends.sign))).tocsc()
+    signed = turns[:, folds] * ends.sign[folds]
     loose = turns[:, free]
     # r = m + more, so that m <= r
-    system = hstack([signed, signed, loose, -loose, eye_array(2 * len(vertices))])
+    system: Any = hstack([signed, signed, loose, -loose, eye_array(rows)])
     count, rest = len(folds), len(folds) + 2 * len(free)
+    bounds: list[tuple[float, float | None]] = [(0.0, 1.0)] * count
+    bounds += [(0.0, None)] * rest
+    bounds += [(-SLACK, SLACK)] * rows
     from scipy.optimize import linprog  # takes a tenth of a second to load
 
     best = linprog(
-        np.concatenate([-np.ones(count), np.zeros(rest + 2 * len(vertices))]),
+        np.concatenate([-np.ones(count), np.zeros(rest + rows)]),
         A_eq=system,
-        b_eq=np.zeros(2 * len(vertices)),
-        bounds=[(0, 1)] * count + [(0, None)] * rest + [(-SLACK, SLACK)] * 2 * len(vertices),
+        b_eq=np.zeros(rows),
+        bounds=bounds,
         method="highs",
         options={"maxiter": MOST_PIVOTS},
     )
-    if best.status != 0:
+    if best.status != 0 or best.x is None:
         return waiting
     return np.sort(np.concatenate([waiting, folds[best.x[:count] < 0.5]]))
 
 
 def refuse_locked(pattern: CreasePattern) -> None:
     """Raise :class:`~miurafab.errors.PatternError` for a large ``pattern`` half of whose folds
-    cannot begin, beside those of curved creases, where facets bend in any case.
+    cannot begin for what is around single vertices, beside folds of curved creases, where facets
+    bend in any case.
     """
     if len(pattern.vertices_coords) <= MOST_BENT:
         return
-    curved = bent_corners(pattern)[pattern.edges_vertices].any(axis=1)
-    inner = (pattern.edges_faces >= 0).all(axis=1)
-    folds = np.flatnonzero(inner & np.isin(pattern.edges_assignment, ("M", "V")) & ~curved)
-    waiting = waiting_folds(pattern)
-    waiting = waiting[~curved[waiting]]
-    if 2 * len(waiting) < len(folds):
+    ends = _ends_inside(pattern)
+    curved = np.asarray(bent_corners(pattern)[pattern.edges_vertices].any(axis=1))
+    folds = ends.folds[~curved[ends.folds]]
+    waiting = folds[_rests_at_vertices(ends)[folds]]
+    if not len(folds) or 2 * len(waiting) < len(folds):
         return
     raise PatternError(
         f"The pattern was not folded: with flat facets {len(waiting)} of its {len(folds)} folds "
@@ -112,15 +105,44 @@ def refuse_locked(pattern: CreasePattern) -> None:
     )
 
 
-def _rests_at_vertices(edge: Ints, at: Ints, away: Floats, sign: Ints, free: Ints) -> Bools:
-    """(E,) which edges must rest for what is around one of their ends, or for what rests there.
-
-    The ends are n rays along ``away`` (n, 2) of the ``edge`` (n,) from the vertex ``at`` (n,). An
-    edge turns to the side ``sign`` (E,), if not 0, or is one of those ``free`` to turn to both.
+class _Ends(NamedTuple):
+    """The n ends of edges at one of ``vertices`` inside: of the ``edge`` (n,), ``at`` (n,) the
+    vertex, from which the unit vector ``away`` (n, 2) leads. The ``folds`` turn to the side
+    ``sign`` (E,), which is 0 for others, and the edges ``free`` to both.
     """
-    both = np.flatnonzero(np.isin(edge, free))
-    signed = np.concatenate([sign[edge, None] * away, away[both], -away[both]])
-    edge, at = (np.concatenate([each, each[both], each[both]]) for each in (edge, at))
+
+    vertices: int
+    edge: Ints
+    at: Ints
+    away: Floats
+    sign: Ints
+    folds: Ints
+    free: Ints
+
+
+def _ends_inside(pattern: CreasePattern) -> _Ends:
+    inner = (pattern.edges_faces >= 0).all(axis=1)
+    letters = pattern.edges_assignment
+    sign = np.where(inner, np.select([letters == "M", letters == "V"], [-1, 1], 0), 0)
+    vertices = interior_vertices(pattern)
+    row = np.full(len(pattern.vertices_coords), -1, dtype=np.int64)
+    row[vertices] = np.arange(len(vertices))
+    ends = pattern.edges_vertices
+    edge, end = np.nonzero(row[ends] >= 0)
+    along = pattern.vertices_coords[ends[:, 1]] - pattern.vertices_coords[ends[:, 0]]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    away = np.where(end == 0, 1.0, -1.0)[:, None] * along[edge]
+    free = np.flatnonzero(inner & (letters == "U"))
+    at = row[ends[edge, end]]
+    return _Ends(len(vertices), edge, at, away, sign, np.flatnonzero(sign), free)
+
+
+def _rests_at_vertices(ends: _Ends) -> Bools:
+    """(E,) which edges must rest for what is around one of their ends, or for what rests there."""
+    sign, away = ends.sign, ends.away
+    both = np.flatnonzero(np.isin(ends.edge, ends.free))
+    signed = np.concatenate([sign[ends.edge, None] * away, away[both], -away[both]])
+    edge, at = (np.concatenate([each, each[both], each[both]]) for each in (ends.edge, ends.at))
     angle = np.arctan2(signed[:, 1], signed[:, 0])
     order = np.lexsort([angle, at])
     order = order[signed[order].any(axis=1)]

@@ -82,6 +82,8 @@ def find_motion(
     """
     pattern = cut_open(pattern)
     first_facets(pattern, place(pattern, np.zeros((1, len(pattern.edges_vertices)))).depth)
+    if pattern.folded_coords is None:
+        refuse_locked(pattern)
     lean = without_flat_edges(pattern)
     found = _find(lean.pattern, steps, on_progress)
     verdict = found.verdict
@@ -118,7 +120,6 @@ def _find(pattern: CreasePattern, steps: int, on_progress: Progress | None) -> F
 def _from_flat(
     pattern: CreasePattern, steps: int, mismatch: float | None, on_progress: Progress | None
 ) -> FoundMotion:
-    refuse_locked(pattern)
     softness = SOFTNESS
     most = MOST_AGAIN // len(pattern.vertices_coords)
     again = steps <= most
