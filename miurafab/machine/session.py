@@ -356,10 +356,6 @@ class Session:
         if self.transcript is not None:
             self.transcript.sent(self.now(), data)
 
-    def close(self) -> None:
-        """Release the port."""
-        self._transport.close()
-
 
 def _stands(report: StatusReport) -> bool:
     """Whether the axes stand, or no feed hold brings them to rest, as none does in homing; a hold

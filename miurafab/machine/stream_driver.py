@@ -69,7 +69,6 @@ class StreamDriver(ABC):
         self.journal = context.journal
         self._context = context
         self._records = [r for r in (context.transcript, context.journal) if r is not None]
-        self._begin = self._tell_at = 0.0
         self._overrides = AS_WRITTEN
         self._overridden: set[Overrides] = set()
 

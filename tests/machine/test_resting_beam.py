@@ -55,7 +55,8 @@ def test_a_burning_beam_may_be_turned_down_and_not_up() -> None:
     assert is_sent(session, wire, "M3 S500")
     assert is_sent(session, wire, "S300")
     assert is_sent(session, wire, "S300")
-    assert not is_sent(session, wire, "S301")
+    assert is_sent(session, wire, "M3 S200")
+    assert not is_sent(session, wire, "S201")
     assert wire.device.beam_on
     assert session.close()
     assert not wire.device.beam_on

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from wires import BANNER
 
-from miurafab.errors import ControllerError
+from miurafab.errors import ControllerError, PortError
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Banner
@@ -244,6 +244,16 @@ def test_a_hold_is_waited_for_a_second_at_most_and_then_comes_the_reset(
     assert all(b - a >= 0.1 for a, b in itertools.pairwise(asked))
 
 
+def test_a_hold_over_a_wire_that_is_gone_confirms_nothing() -> None:
+    session, wire = greeted(query=[HELD], reset=[BANNER])
+
+    def gone(data: bytes) -> None:
+        raise PortError("The port of the script went away.")
+
+    wire.write_now = gone  # type: ignore[method-assign]
+    assert session.hold_and_stop() is False
+
+
 def test_a_hold_before_a_reset_is_recorded(tmp_path: Path) -> None:
     session, _ = greeted(query=[HELD], reset=[BANNER])
     session.transcript = Transcript(tmp_path / "t", "a test")
@@ -335,9 +345,11 @@ def test_each_start_is_counted_and_one_that_nobody_sent_is_told() -> None:
     assert session.stop()
     assert session.starts == 2
     assert session.restarted_itself is False
+    assert session.stop()
+    assert session.starts == 4
     wire._said += BANNER
     session.pause(0.2)
-    assert session.starts == 3
+    assert session.starts == 5
     assert session.restarted_itself
     assert session.connection.state is State.GREETED
 

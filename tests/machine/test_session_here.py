@@ -157,8 +157,9 @@ def test_a_key_resets_whichever_way_a_job_is_sent(
     opened: Opened, cut: Callable[[FakeWire, Reset], object]
 ) -> None:
     wire = opened.wire
-    with pytest.raises(JobStopped, match="stopped at the keyboard"):
+    with pytest.raises(JobStopped, match="stopped at the keyboard") as caught:
         cut(wire, Reset(wire))
+    assert type(caught.value) is JobStopped
     assert wire.commands.endswith(b"\x18")
     assert wire.closed
     wire.settle()
