@@ -47,7 +47,8 @@ def overcuts(moves: Floats, stroke: Ints, overcut_mm: float, near: float) -> tup
     short = []
     lengths = np.linalg.norm(moves[:, 2:] - moves[:, :2], axis=1)
     first = np.flatnonzero(np.diff(stroke, prepend=-1))
-    for begin, last in zip(first.tolist(), [*first[1:].tolist(), len(moves)], strict=True):
+    end = np.flatnonzero(np.diff(stroke, append=-1)) + 1
+    for begin, last in zip(first.tolist(), end.tolist(), strict=True):
         home = np.linalg.norm(moves[begin:last, 2:] - moves[begin, :2], axis=1) <= near
         along = np.cumsum(lengths[begin:last])
         # Home again, and not still there: the stroke has been somewhere else.

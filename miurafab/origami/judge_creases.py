@@ -235,7 +235,7 @@ def _letter_faults(pattern: CreasePattern) -> Iterator[_Fault]:
             f"Edge {edge} is a border (B) and lies between facets {one} and {other}; a cut within "
             "the sheet is C.",
         )
-    sign = np.select([letters == "M", letters == "V"], [-1, 1], 0)
+    sign = np.select([letters == "M", letters == "V"], [-1, 1])
     # A file of the flat state may give 0 for every fold.
     sizes_told = (np.abs(angles) > FLAT_ANGLE).any()
     wrong = np.where(np.abs(angles) > FLAT_ANGLE, np.sign(angles), 0) != sign

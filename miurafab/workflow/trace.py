@@ -187,9 +187,8 @@ def _compared(
         if len(faulty) > _NAMED:
             others = counted(len(faulty) - _NAMED, "more stroke is", "more strokes are")
             yield Finding("stroke", f"{path.sheet}: {others} {words}.", path.sheet)
-    good = np.ones(len(path), dtype=bool)
-    good[wanted.stroke[(less | more) & wanted.sure]] = False
-    traced.update(KINDS[kind] for kind in kinds[good].tolist())
+    right_kinds = np.delete(kinds, wanted.stroke[(less | more) & wanted.sure])
+    traced.update(KINDS[kind] for kind in right_kinds.tolist())
 
 
 def _heights(operations: Mapping[str, Operation]) -> tuple[Floats, Ints]:

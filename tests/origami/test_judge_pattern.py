@@ -146,6 +146,12 @@ def test_facets_that_meet_are_not_proved_to_lie_apart(pattern: CreasePattern) ->
     assert not any("No facets meet" in claim for claim in audit(pattern).proved)
 
 
+def test_without_a_folded_form_nothing_is_known_to_cross() -> None:
+    evidence = gather(replace(two_squares(), folded_coords=None))
+    assert (evidence.residuals, evidence.folds) == (None, None)
+    assert (evidence.crossings.shape, evidence.crossings.dtype) == ((0, 2), np.int64)
+
+
 def test_forms_of_few_digits_are_the_same_within_what_is_left() -> None:
     moved = shifted(regular().vertices_coords, 31, 1e-6, 0.0)
     rounded = replace(regular(), vertices_coords=moved, rounded=1e-6)
@@ -299,6 +305,8 @@ def test_facets_that_meet_are_named_in_pairs() -> None:
     assert [
         each.code for each in refusals(audit(replace(two_squares(), cells=cells)).findings)
     ] == ["self-intersection"]
+    found = refusals(audit(replace(two_squares(), grid=(4, 2))).findings)
+    assert [each.code for each in found] == ["facets", "self-intersection"]
     (told,) = audit(rolled(math.radians(58), 8)).findings
     assert told.sentence == (
         "3 pairs of facets pass through or lie on each other in the folded form, the first being "
@@ -395,8 +403,8 @@ def folding_by(degrees: float) -> Quality:
         ({"coverage": 0.9494}, "coverage: The sheet covers 94.9 % of the target's area."),
         ({"overhang": 0.01}, ""),
         (
-            {"overhang": 0.025},
-            "overhang: 2.5 % of the sheet reaches beyond the border of the target or lies over its "
+            {"overhang": 0.505},
+            "overhang: 50.5 % of the sheet reaches beyond the border of the target or lies over its "
             "holes.",
         ),
     ],
@@ -421,6 +429,9 @@ def test_the_numbers_alone_are_those_of_the_audit() -> None:
     assert found.seam_mm == pytest.approx(lengths[two_pieces().seams[:, 0]].sum())
     assert found.seam_mm == pytest.approx(lengths[two_pieces().seams[:, 1]].sum())
     assert (found.pieces, found.overlaps, found.self_intersections) == (2, 0, 0)
+    squares = unit_squares()  # of their seam, the second edge is made longer
+    longer = shifted(squares.vertices_coords, 7, 0.0, 0.25)
+    assert measure(replace(squares, vertices_coords=longer)).seam_mm == 1.0
     assert found.min_edge_mm == pytest.approx(lengths.min())
     pattern = regular()
     near = pattern.folded_coords.copy()

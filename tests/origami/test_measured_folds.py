@@ -192,7 +192,7 @@ def contradicts(letter: str, degrees: int) -> tuple[str, str]:
         (
             RIGHT,
             "F",
-            0.0,
+            -0.0,
             [
                 ("assignment", "Edge 3 folds by 90 degrees in the folded form, and is F, not V."),
                 (
@@ -291,6 +291,9 @@ def test_folds_that_are_all_0_contradict_no_letter_without_a_folded_form() -> No
     pattern = replace(regular(4, 4), folded_coords=None)
     still = replace(pattern, edges_fold_angle=np.zeros(len(pattern.edges_vertices)))
     assert said(still, form=False) == []
+    mountain = int(np.flatnonzero(pattern.edges_assignment == "M")[0])
+    still.edges_fold_angle[mountain] = -FLAT_ANGLE  # as good as none, and tells no size either
+    assert [each[:2] for each in said(still, form=False)] == [("assignment", (mountain,))]
     angles = pattern.edges_fold_angle.copy()
     crease = int(np.flatnonzero(pattern.edges_assignment == "V")[0])
     angles[crease] = 0.0
@@ -350,12 +353,12 @@ def test_an_edge_of_no_facet_is_told_unless_it_is_flat() -> None:
     pattern = replace(hinge(0.0), folded_coords=None)
     edges = np.append(pattern.edges_vertices, [[0, 2]], axis=0)
 
-    def with_one(letter: str) -> list[tuple[str, tuple, str]]:
+    def with_one(letter: str, angle: float = 0.0) -> list[tuple[str, tuple, str]]:
         more = replace(
             pattern,
             edges_vertices=edges,
             edges_assignment=np.append(pattern.edges_assignment, letter),
-            edges_fold_angle=np.append(pattern.edges_fold_angle, 0.0),
+            edges_fold_angle=np.append(pattern.edges_fold_angle, angle),
         )
         return said(more, form=False)
 
@@ -367,6 +370,7 @@ def test_an_edge_of_no_facet_is_told_unless_it_is_flat() -> None:
         )
         assert with_one(letter) == [("facets", (last,), sentence)]
     assert with_one("F") == []
+    assert with_one("F", 0.5) == []  # it is a side of nothing that folds
 
 
 def test_facets_that_are_not_those_of_the_grid_are_named() -> None:
@@ -422,9 +426,10 @@ def test_neighbours_whose_cells_lie_apart_are_named() -> None:
     diagonal = column.copy()
     diagonal[1, 1] = diagonal[3, 1] = 2
     diagonal[2, 1] = 4
-    assert [each[1] for each in said(replace(pattern, cells=diagonal), form=False)] == [
-        tuple(inner.tolist())
-    ]
+    ((_, where, sentence),) = said(replace(pattern, cells=diagonal), form=False)
+    assert where == tuple(inner.tolist())
+    more = f"2 more edges ({inner[1]}, {inner[2]})"
+    assert sentence.endswith(f" The same kind of fault is at {more}.")
 
 
 def test_two_rings_close_each_on_itself() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -351,6 +352,11 @@ def test_each_distance_has_its_name(monkeypatch):
         assert (found.hausdorff_midsurface_mm, found.facets) == (2.0, 4)
     assert [each[:2] for each in asked] == [(pattern, PLANE)] * 2
     assert [len(each[2]) for each in asked] == [len(tiles), 1]
+    made = []
+    surface = SimpleNamespace(tiles=lambda: made.append(tiles) or tiles)
+    assert with_distances(measure(pattern), pattern, surface).hausdorff_mm == 5.0
+    assert len(made) == 1  # for the distances and the coverage
+    assert asked[-1][2] is tiles
 
 
 def test_distances_that_are_known_are_not_measured_again():
@@ -394,6 +400,10 @@ def test_what_is_measured_is_the_worst_of_each_kind():
     assert measured.max_isometry == found.isometry.max() > 0
     exact = measure(regular(4, 2))  # no vertex is within the sheet
     assert (exact.max_developability, exact.max_flat_foldability) == (0.0, 0.0)
+    assert (exact.seam_mm, measure(replace(regular(), folded_coords=None)).max_planarity) == (
+        0,
+        None,
+    )
     assert measure(rolled(math.radians(58), 8)).self_intersections == 3
     assert measure(fan(math.tau * 14 / 12, 14)).overlaps == 2
 

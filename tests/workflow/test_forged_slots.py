@@ -179,6 +179,26 @@ def test_a_slot_keeps_clear_of_other_tabs_on_its_facet(away: float, in_the_way: 
     assert ("The slot for tab a1 lies in the way of tab a2." in said) is in_the_way
 
 
+@pytest.mark.parametrize(
+    ("letter", "folds", "right"),
+    [("F", "flat", True), ("F", "valley", False), ("U", "unassigned", True), ("V", "valley", True)],
+)
+def test_a_tab_on_an_edge_within_the_sheet_folds_as_the_edge_does(
+    letter: str, folds: str, right: bool
+) -> None:
+    document = json.loads((made("slots") / "layout.json").read_text())
+    tab(document)["fold"] = folds
+    outlined, pattern, labels = outlined_of(document)
+    pattern.edges_assignment[tab(document)["edge"]] = letter
+    layout = read_layout(json.dumps(document), made("slots") / "layout.json")
+    found = held(outlined, pattern, CARD, labels, "slots")
+    said = [
+        each for each in joint_faults(layout, pattern, found, labels, "slots") if "fold" in each
+    ]
+    told = f"Tab a1 is told to fold {folds}, and its edge is {letter}."
+    assert said == ([] if right else [told])
+
+
 def test_a_slot_keeps_clear_of_the_sides_of_its_facet(tmp_path: Path) -> None:
     found = said(tmp_path, lambda document: along(document, 1.5))
     assert found[0] == "The slot for tab a1 lies within 1 mm of a side of its facet."

@@ -164,9 +164,9 @@ KNIFE, CUTTER = pivoting("grbl-knife-a3"), pivoting("hpgl-cutter-a3")
 @pytest.mark.parametrize(
     ("profile", "shift", "right"),
     [
-        (LASER, 0.0039, True),
+        (LASER, 0.004, True),
         (LASER, 0.0041, False),
-        (KNIFE, 0.0099, True),
+        (KNIFE, 0.01, True),
         (KNIFE, 0.0101, False),
         (CUTTER, 0.05, True),
         (CUTTER, 0.075, False),
@@ -175,13 +175,74 @@ KNIFE, CUTTER = pivoting("grbl-knife-a3"), pivoting("hpgl-cutter-a3")
 def test_an_end_may_be_out_of_its_place_by_twice_what_the_machine_rounds(
     profile: MachineProfile, shift: float, right: bool
 ) -> None:
-    (a, b), (c, d) = dash(10)[1]
+    (a, b), (c, d) = dash(0)[1]
     text = burnt("perforate", [(a + shift, b), (c, d)])
     if profile is CUTTER:
         text = f"PU{(a + shift) * 40:g},{b * 40:g};PD{c * 40:g},{d * 40:g};PU0,0;"
-    says, traced = found([dash(10)], text, profile=profile)
+    says, traced = found([dash(0)], text, profile=profile)
     assert len(says) == (0 if right else 2)
     assert traced["crease"] == right
+
+
+@pytest.mark.parametrize(("z", "right"), [(0.002, True), (-0.002, True), (0.0021, False)])
+def test_the_head_may_be_off_its_height_by_what_is_rounded(z: float, right: bool) -> None:
+    says, traced = found([dash(10)], burnt("perforate", dash(10)[1], z))
+    assert len(says) == (0 if right else 2)
+    assert traced["crease"] == right
+
+
+def test_a_stroke_alone_may_be_burnt_from_its_end() -> None:
+    assert found([dash(10)], burnt("perforate", dash(10)[1][::-1])) == ([], {"crease": 1})
+
+
+@pytest.mark.parametrize(("off", "swivels"), [(0.01, True), (0.012, False)])
+def test_a_segment_of_a_knife_ends_near_corners(off: float, swivels: bool) -> None:
+    stroke = dash(0, 0.0)
+    text = burnt("perforate", stroke[1]) + "M3 S0\n" + burnt("perforate", [(0, 0), (0, off)])
+    assert (found([stroke], text, profile=KNIFE)[0] == []) is swivels
+
+
+SQUARE = [(50.0, 50.0), (60.0, 50.0), (60.0, 60.0), (50.0, 60.0), (50.0, 50.0)]
+
+
+@pytest.mark.parametrize(
+    ("beyond", "says"),
+    [
+        (0.5, ""),
+        (0.51, ""),
+        (0.512, "line 12 burns a stroke from X50.000 Y50.000 that is not of the pattern"),
+        (0.49, ""),
+        (0.488, "the stroke at line 8 goes round and not on by the overcut of 0.5 mm."),
+    ],
+)
+def test_a_closed_cut_of_a_knife_goes_on_by_its_overcut(beyond: float, says: str) -> None:
+    overcutting = replace(KNIFE.tool.knife, overcut_mm=0.5)
+    profile = replace(KNIFE, tool=replace(KNIFE.tool, knife=overcutting))
+    strokes = [dash(10), ("cut", SQUARE, -1, OUTLINE)]
+    ways = burnt("perforate", dash(10)[1]) + "M3 S0\n"
+    ways += burnt("cut", [*SQUARE, (50 + beyond, 50.0)])
+    told, traced = found(strokes, ways, profile=profile)
+    assert (told == []) is (says == "")
+    assert all(each.startswith(says) for each in told[:1])
+    assert traced == {"crease": 1, "outline": 1}
+
+
+def test_what_a_knife_leaves_out_is_not_wanted() -> None:
+    label = ("engrave", [(20.0, 20.0), (25.0, 20.0)], -1, 0)
+    text = burnt("perforate", dash(10)[1])
+    for left_out, says in ((("engrave",), 0), ((), 1)):
+        knife = replace(KNIFE.tool.knife, leave_out=left_out)
+        profile = replace(KNIFE, tool=replace(KNIFE.tool, knife=knife))
+        assert len(found([label, dash(10)], text, profile=profile)[0]) == says
+        assert found([label, dash(10)], text, profile=profile)[1] == {"crease": 1}
+
+
+def test_a_sheet_without_a_stroke_has_no_cut_that_aligns_the_blade() -> None:
+    knife = load_machine("grbl-knife-a3")
+    assert found([], "G0 X10 Y10\n", profile=knife) == ([], {})
+    says, traced = found([dash(10)], "G0 X10 Y10\n", profile=knife)
+    assert [each[:15] for each in says] == ["the aligning cu", "the crease on e"]
+    assert not traced
 
 
 def test_a_knife_turns_round_at_corners_by_segments_of_its_own() -> None:
