@@ -271,13 +271,15 @@ def test_no_order_is_claimed_for_what_does_not_fold_flat(tmp_path: Path) -> None
 
 
 def test_a_search_is_not_advised_after_it_was_made() -> None:
-    """Eight creases, mountains and valleys in turn, fold flat in no order of their layers."""
+    """Eight creases, valleys and mountains in turn, fold flat in no order of their layers."""
     turns = np.radians(np.arange(0, 360, 45))
     ends = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    creases = [
-        ((0.0, 0.0), (*end,), letter, 180.0) for end, letter in zip(ends, "MV" * 4, strict=True)
-    ]
+    sizes = {"M": 180.0, "V": 90.0}
+    letters = zip(ends, "VM" * 4, strict=True)
+    creases = [((0.0, 0.0), (*end,), letter, sizes[letter]) for end, letter in letters]
     found = layers(drawn([*creases, *border(*ends)]))
+    assert found.closed is not None
+    assert [each.code for each in layer_findings(found.closed)] == ["undecided-layers"]
     assert (found.exists, found.search.complete) == (False, True)
     assert [finding.code for finding in found.findings] == ["cannot-fold-flat"]
 
