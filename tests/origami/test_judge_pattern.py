@@ -16,7 +16,13 @@ from miurafab.findings import Finding, counted, refusals
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import EXACT
-from miurafab.origami.judge_pattern import gather, judge_quality, proved, unlisted_seams
+from miurafab.origami.judge_pattern import (
+    _lie_together,
+    gather,
+    judge_quality,
+    proved,
+    unlisted_seams,
+)
 from miurafab.origami.quality import Quality
 from miurafab.origami.verify import Audit, Measurements, audit, measure
 
@@ -316,6 +322,38 @@ def test_facets_that_meet_are_named_in_pairs() -> None:
     assert told.sentence.startswith("2 pairs of facets lie on each other in the folded form, the ")
 
 
+@pytest.mark.parametrize(
+    ("height", "turn", "worst", "together"),
+    [
+        (9e-6, 0.0, 0.0, True),  # in edges of 10 mm
+        (1.1e-5, 0.0, 0.0, False),
+        (0.0, 9e-7, 0.0, True),
+        (0.0, 1.1e-6, 0.0, False),
+        (6.4e-4, 0.0, 1e-6, True),
+        (6.6e-4, 0.0, 1e-6, False),
+        (0.0, 6.4e-5, 1e-6, True),
+        (0.0, 6.6e-5, 1e-6, False),
+    ],
+)
+def test_facets_lie_together_within_what_their_forms_are_exact(
+    height: float, turn: float, worst: float, together: bool
+) -> None:
+    """Beside a pair of squares that cross, and one of squares that lie a whole edge apart."""
+    parts = [two_squares(height, turn), two_squares(turn=1.0), two_squares(height=10.0)]
+    faces = np.concatenate([part.faces_vertices + 8 * n for n, part in enumerate(parts)])
+    edges = np.concatenate([part.edges_vertices + 8 * n for n, part in enumerate(parts)])
+    whole = CreasePattern(
+        np.concatenate([part.vertices_coords for part in parts]),
+        edges,
+        np.full(24, "B"),
+        np.zeros(24),
+        faces,
+        np.concatenate([part.folded_coords for part in parts]),
+    )
+    pairs = np.arange(6).reshape(3, 2)
+    assert _lie_together(whole, pairs, worst).tolist() == [together, False, False]
+
+
 def test_facets_that_overlap_when_flat_are_told_from_pieces_that_do() -> None:
     (told,) = [
         each for each in audit(fan(math.tau * 14 / 12, 14)).findings if each.code == "overlap"
@@ -404,8 +442,8 @@ def folding_by(degrees: float) -> Quality:
         ({"overhang": 0.01}, ""),
         (
             {"overhang": 0.505},
-            "overhang: 50.5 % of the sheet reaches beyond the border of the target or lies over its "
-            "holes.",
+            "overhang: 50.5 % of the sheet reaches beyond the border of the target or lies over "
+            "its holes.",
         ),
     ],
 )
