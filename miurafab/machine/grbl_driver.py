@@ -10,9 +10,15 @@ controller's queue behind up to seconds of burning.
 
 from __future__ import annotations
 
+import re
+from functools import cached_property
+
+import numpy as np
+
 from miurafab.errors import ControllerError, MiurafabError, PersonNeeded
 from miurafab.findings import Finding
 from miurafab.gcode.program import BEAM_M3, PAUSE
+from miurafab.geometry.arrays import Floats
 from miurafab.grbl.events import Error, Event, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S, RESTARTED
@@ -36,6 +42,10 @@ NOT_CONFIRMED = (
 
 _WAS_ARMED = Finding("armed", "The job ended with the laser armed, so the controller was reset.")
 
+_OTHER_PLACES = re.compile(r"G\s*0*(?:10|28|30|38|43|5[3-9]|9[12])", re.IGNORECASE)
+"""Steps, the machine's own or stored places, and other origins than that of the job."""
+
+_NEAR_MM = 0.1  # more than a step of a motor
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # between status queries while the last moves are made
 
@@ -164,7 +174,8 @@ class GrblDriver(StreamDriver):
         if program is None or not owed or not _rests(report) or self.held:
             return None
         line = owed[0].number  # GRBL answers M0 when its hold is over, and all before it earlier
-        if line not in program.event_line[program.event_kind == PAUSE]:
+        pauses = np.flatnonzero((program.event_line == line) & (program.event_kind == PAUSE))
+        if not len(pauses) or not self._has_come_to(program.end[: program.event_move[pauses[0]]]):
             return None
         where = f"{self.plan.job.name}, line {line}"
         if self.plan.at_pause == "stop":
@@ -175,6 +186,24 @@ class GrblDriver(StreamDriver):
         if self.plan.at_pause == "go on":
             self.orders.append(RESUME)
         return f"waiting at {where} (M0): r goes on"
+
+    def _has_come_to(self, ends: Floats) -> bool:
+        """Whether the head may stand where the last of the moves to ``ends`` (n, 3) ends, in mm: a
+        hold of somebody at the machine stops it before. An axis that stays where the job began
+        tells nothing, nor does a job that names places otherwise than in its own coordinates.
+        """
+        position = self._session.position
+        if position is None or not len(ends) or self._names_other_places:
+            return True
+        return all(
+            abs(ends[-1, axis] - at) < _NEAR_MM
+            for axis, at in enumerate(position[:3])
+            if ends[:, axis].any()
+        )
+
+    @cached_property
+    def _names_other_places(self) -> bool:
+        return _OTHER_PLACES.search(self.plan.job.text) is not None
 
     def obey(self) -> None:
         """Send ``orders``, unless the controller is deaf while it writes its EEPROM."""

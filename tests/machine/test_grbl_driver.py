@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
-from session_walk import MACHINE
+from session_walk import HOMING, MACHINE
 from wires import FakeWire
 
-from miurafab.errors import ControllerError
+from miurafab.errors import ControllerError, PersonNeeded
 from miurafab.gcode.job import Job
-from miurafab.machine.planning import plan_job
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.progress import Progress
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
@@ -88,3 +89,122 @@ def test_a_lost_answer_is_told_before_the_progress_is_shown() -> None:
     (told, *_) = [at for at, data in wire.written if b"\x18" in data]
     asked = [at for at, data in wire.written if data == b"?" and at < told]
     assert 0.0 <= told - asked[-1] < 0.1
+
+
+# Pauses and holds
+
+
+def pressed_at_the_machine(wire: FakeWire, *orders: tuple[float, bytes]) -> None:
+    """What somebody presses at the machine itself, and when."""
+    due = list(orders)
+
+    def press(call: int) -> None:
+        while due and wire.now() >= due[0][0]:
+            wire.device.receive(due.pop(0)[1])
+
+    wire.before_call = press
+
+
+def burnt(wire: FakeWire) -> float:
+    return sum(abs(s.x1 - s.x0) for s in wire.device.beam_log)
+
+
+@pytest.mark.parametrize("end", ["", "G1 X20\n" * 3])
+def test_a_hold_in_the_last_moves_before_a_pause_is_not_that_pause(end: str) -> None:
+    """Which goes on by itself, and the hold does not."""
+    job = Job("paused.nc", f"M4 S0\nG1 X20 S500 F300\n{end}M0\nG1 X30\nM5\n")
+    wire = new_wire()
+    pressed_at_the_machine(wire, (2.0, b"!"), (9.0, b"~"))
+    deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
+    (resumed,) = [at for at, data in wire.written if b"~" in data]
+    assert resumed > 9.0
+    assert wire.device.position[0] == pytest.approx(30.0)
+    assert burnt(wire) == pytest.approx(30, abs=0.2)
+
+
+def test_a_hold_before_a_pause_ends_no_job_that_stops_at_pauses() -> None:
+    job = Job("paused.nc", "M4 S0\nG1 X20 S500 F300\nM0\nG1 X30\nM5\n")
+    wire = new_wire()
+    pressed_at_the_machine(wire, (2.0, b"!"), (9.0, b"~"))
+    with pytest.raises(PersonNeeded, match=r"line 3 waits for a person \(M0\)"):
+        deliver(replace(plan_job(job, MACHINE), at_pause="stop"), wire, StopSignals())
+    assert burnt(wire) == pytest.approx(20, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("before", "moves"),
+    [
+        ("", "G1 X20 S500 F3000\n"),
+        ("", "G20\nG1 X0.7874 S500 F100\nG21\n"),
+        ("", "G91\nG1 X20 S500 F3000\nG90\n"),
+        ("", "G92 X5\nG1 X25 S500 F3000\n"),
+        ("", "G1 X20 S500 F3000\nG53 G0 X0\nG0 X20\n"),
+        ("", "G1 X10 S500 F3000\nG2 X20 I5\n"),
+        ("G0X0Y7\n", "G1 X20 S500 F3000\n"),
+        ("G10L2P1X3Y4\n", "G1 X20 S500 F3000\n"),
+    ],
+)
+def test_a_pause_is_known_wherever_the_program_says_that_it_is(before: str, moves: str) -> None:
+    job = Job("paused.nc", f"M4 S0\n{moves}M0\nG4 P0.1\nM5\n")
+    wire = new_wire()
+    if before:
+        wire.device.receive(before.encode())
+        wire.device.advance(5.0)
+        wire.device.take_output()
+    deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
+    assert wire.commands.count(b"~") == 1
+
+
+def test_a_pause_before_any_move_is_one() -> None:
+    wire = new_wire()
+    job = Job("paused.nc", "M0\nM4 S0\nG1 X20 S500 F3000\nM5\n")
+    deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
+    assert burnt(wire) == pytest.approx(20, abs=0.2)
+
+
+def test_a_hold_that_is_pressed_as_the_job_begins_is_left_alone() -> None:
+    wire = new_wire()
+    orders = [b"!"]
+
+    def press(call: int) -> None:
+        if orders and b"G1X20" in wire.commands:
+            wire.device.receive(orders.pop())
+        if wire.now() > 6.0:
+            wire.device.receive(b"~")
+
+    wire.before_call = press
+    job = Job("held.nc", "M4 S0\nG1 X20 S500 F3000\nM5\n")
+    assert deliver(plan_job(job, MACHINE), wire, StopSignals()).seconds > 4
+    assert b"~" not in wire.commands
+
+
+# What is sent and told
+
+
+def test_a_controller_that_wants_its_answers_gets_one_line_at_a_time() -> None:
+    machine = replace(MACHINE, controller=replace(MACHINE.controller, streaming="send-response"))
+    wire = new_wire()
+    job = Job("a.nc", "M4 S0\n" + "".join(f"G1 X{n} S500 F3000\n" for n in range(20)) + "M5\n")
+    seen: list[Progress] = []
+    deliver(plan_job(job, machine), wire, StopSignals(), on_progress=seen.append)
+    assert max(data.count(b"\n") for _, data in wire.written) == 1
+    assert max(now.in_flight for now in seen) <= len("G1X10S500F3000\n")
+
+
+def test_before_the_first_answer_no_line_is_taken() -> None:
+    wire = new_wire()
+    seen: list[Progress] = []
+    job = Job("dwell.nc", "\n\nG4 P1\nG0 X1\n")
+    deliver(plan_job(job, MACHINE), wire, StopSignals(), on_progress=seen.append)
+    assert (seen[0].lines_acknowledged, seen[0].line) == (0, 0)
+    assert (seen[-1].lines_acknowledged, seen[-1].line) == (2, 4)
+
+
+def test_a_machine_that_was_homed_and_then_refused_keeps_its_place() -> None:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE) | HOMING | {30: 255}, baud=115_200))
+    plan = plan_job(Job("a.nc", "G0 X1\n"), MACHINE, SendOptions(home=True))
+    with pytest.raises(ControllerError, match="largest S value") as caught:
+        deliver(plan, wire, StopSignals())
+    assert "reset" not in str(caught.value)
+    assert b"$H\n" in wire.commands
+    assert b"\x18" not in wire.commands
