@@ -162,7 +162,8 @@ def _joined(lines: CreaseLines, drawn: DrawnSides) -> _Joined:
     letter = lines.assignment[line[rows]]
     pieces, piece = connected_parts(faces)
     whole = without_holes(faces, piece, sides, letter, len(points))
-    holes = int((~whole).sum())
+    areas = np.abs(signed_areas(points[filled(faces)]))
+    holes = areas[~whole] / areas.sum()
     faces, piece = faces[whole], piece[whole]
     if pieces > 1:
         refuse_loose_parts(points, sides, faces, piece)

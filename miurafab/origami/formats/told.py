@@ -15,17 +15,18 @@ _OVERSHOOT = 0.05
 
 
 def told_of_lines(
-    lines: CreaseLines, source: Ints, stands_for: Ints, lengths: Floats, holes: int
+    lines: CreaseLines, source: Ints, stands_for: Ints, lengths: Floats, holes: Floats
 ) -> tuple[Finding, ...]:
     """What became of ``lines``, of which m sides were made: ``source`` (m,) is the line of each
     side, ``stands_for`` (m,) the side of the pattern in its place, -1 for none, ``lengths`` (m,)
-    how long it is on the paper, and ``holes`` the number of holes.
+    how long it is on the paper, and ``holes`` (h,) the area of each
+    hole over that of all facets and holes.
     """
     return tuple(_told(lines, source, stands_for, lengths, holes))
 
 
 def _told(
-    lines: CreaseLines, source: Ints, stands_for: Ints, lengths: Floats, holes: int
+    lines: CreaseLines, source: Ints, stands_for: Ints, lengths: Floats, holes: Floats
 ) -> Iterator[Finding]:
     if lines.curve is not None:
         count = int((lines.curve >= 0).sum())
@@ -70,12 +71,14 @@ def _told(
     if lines.left_out:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(lines.left_out.items()))
         yield Finding("lost-lines", f"Parts of the drawing are not read: {kinds}.")
-    if holes:
+    if len(holes):
         says = (
-            f"{_many(holes, 'part')} of the drawing, with borders alone around, "
-            f"{'holds' if holes == 1 else 'hold'} no paper."
+            f"{_many(len(holes), 'part')} of the drawing, with borders alone around, "
+            f"{'holds' if len(holes) == 1 else 'hold'} no paper, {100 * holes.sum():.2g} % of its "
+            "area"
         )
-        yield Finding("holes", says)
+        way = "; draw a flat line (F) in each that is paper" if holes.sum() > 0.5 else ""
+        yield Finding("holes", f"{says}{way}.")
 
 
 def lost_lines(lines: CreaseLines, source: Ints, stands_for: Ints) -> Bools:

@@ -305,3 +305,22 @@ def test_a_part_without_paper_is_told() -> None:
     inner = (("B", 0.5, 0.5, 1, 0.5), ("B", 1, 0.5, 1, 1), ("B", 1, 1, 0.5, 0.5))
     found = pattern_from_lines(drawn(*SQUARE, *inner, ("V", 0, 0, 0.5, 0.5), ("M", 1, 1, 2, 2)))
     assert [finding.code for finding in found.told] == ["holes"]
+    assert found.told[0].sentence == (
+        "1 part of the drawing, with borders alone around, holds no paper, 3.1 % of its area."
+    )
+
+
+def test_paper_that_passes_for_a_hole_is_told_with_the_way_out() -> None:
+    """A square beside a creased one: that it is paper its borders do not tell, a flat line does."""
+    other = (("B", 2, 0, 6, 0), ("B", 6, 0, 6, 4), ("B", 6, 4, 2, 4), ("B", 2, 4, 2, 2))
+    crease = ("V", 0, 1, 2, 1)
+    found = pattern_from_lines(drawn(*SQUARE, *other, crease))
+    assert area_of(found) == pytest.approx(4)
+    said = [finding.sentence for finding in found.told if finding.code == "holes"]
+    assert said == [
+        "1 part of the drawing, with borders alone around, holds no paper, 80 % of its area; draw "
+        "a flat line (F) in each that is paper."
+    ]
+    whole = pattern_from_lines(drawn(*SQUARE, *other, crease, ("F", 2, 4, 6, 0)))
+    assert area_of(whole) == pytest.approx(20)
+    assert "holes" not in [finding.code for finding in whole.told]
