@@ -1,11 +1,15 @@
 """The further frames of a file are judged: places, lengths, and the order of layers."""
 
 import json
+import math
 
 import numpy as np
 import pytest
 
 import miurafab as mf
+from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.formats.fold_states import FurtherFrame
+from miurafab.origami.judge_frames import judge_frames
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +88,31 @@ def test_an_order_that_is_none_is_one_sentence(document, tmp_path, triple):
     frame["faceOrders"].append(triple)
     with pytest.raises(mf.MiurafabError, match="faceOrders"):
         judged(found, tmp_path)
+
+
+@pytest.mark.parametrize("orders", [None, np.array([[0, 0, 0]])])
+def test_an_edge_may_be_longer_by_a_millionth_of_the_mean_and_no_more(orders):
+    """Edges of 3, 4, 0 and 5 mm: between the two corners in one place, a length is exact."""
+    flat = np.array([[0, 0], [3, 0], [3, 4], [3, 4.0]])
+    ring = np.arange(4)
+    pattern = CreasePattern(
+        flat, np.stack([ring, np.roll(ring, -1)], 1), np.full(4, "B"), np.zeros(4), ring[None]
+    )
+    for length, code in ((3e-6, None), (math.nextafter(3e-6, 1), "frame")):
+        points = np.pad(flat, ((0, 0), (0, 1)))
+        points[3, 2] = length  # across the others
+        code = code and ("stretched" if orders is None else code)
+        told = list(judge_frames(pattern, [FurtherFrame(4, points, orders)]))
+        assert [each.code for each in told if each.where == (2,)] == ([code] if code else [])
+        judged = [each for each in told if "no order in closed form" in each.sentence]
+        assert len(judged) == (orders is not None and not code)
+        assert all(each.code == "not-proven" for each in judged)
+    points[3, 2], points[0, 0] = 3e-6, -1.0  # two edges are longer, the third is as long as it may
+    (told,) = judge_frames(pattern, [FurtherFrame(4, points, orders)])
+    assert told.where == (0, 3)
+    assert told.sentence.endswith("write the file anew, or take the frame out.")
+    (told,) = judge_frames(pattern, [FurtherFrame(n, points, orders) for n in (4, 7)])
+    assert told.sentence.startswith("2 of 2 frames are no states of the sheet, and frame 4 is the ")
 
 
 def test_a_frame_of_a_motion_that_stretches_is_told(document, tmp_path):

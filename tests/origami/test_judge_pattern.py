@@ -280,7 +280,8 @@ def test_seams_that_are_not_named_are_found() -> None:
         f"edges {pairs[0, 0]} and {pairs[0, 1]};"
     )
     assert told.where == tuple(sorted(pattern.seams.ravel().tolist()))
-    assert unlisted_seams(replace(pattern, seams=None)).shape == (0, 2)
+    nothing = unlisted_seams(replace(pattern, seams=None))
+    assert (nothing.shape, nothing.dtype) == ((0, 2), np.int64)
     assert said(replace(pattern, seams=None)) == []
 
 

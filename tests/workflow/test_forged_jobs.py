@@ -111,6 +111,10 @@ def slot(layout: Document) -> Document:
     return found
 
 
+def slot_of_a1() -> Document:
+    return slot(json.loads((made("slots") / "layout.json").read_text()))
+
+
 FORGED: dict[str, tuple[str, Callable[[Document], object], list[str], bool]] = {
     "unplaced": (
         "glue",
@@ -229,6 +233,33 @@ FORGED: dict[str, tuple[str, Callable[[Document], object], list[str], bool]] = {
         "slots",
         lambda d: slot(d).update(tab=9),
         [FOREIGN.format("a1"), NO_SLOT],
+        False,
+    ),
+    "slot of no tab with the last label": (
+        "slots",
+        lambda d: d["patches"][0]["slots"][0].update(tab=9),
+        [FOREIGN.format("a4").replace("P2", "P1"), NO_SLOT.replace("a1", "a4")],
+        False,
+    ),
+    "slot of a job without slots": (
+        "glue",
+        lambda d: d["patches"][1]["slots"].append(slot_of_a1()),
+        [FOREIGN.format("a1")],
+        False,
+    ),
+    "no slot, and another that moved": (
+        "slots",
+        lambda d: (d["patches"][1]["slots"].pop(0), moved(slot(d), 0.001, 0.0)),
+        [NO_SLOT, "The slot for tab a2 is not the one that its tab goes through."],
+        False,
+    ),
+    "two slots that moved": (
+        "slots",
+        lambda d: [moved(each, 0.001, 0.0) for each in d["patches"][1]["slots"][:2]],
+        [
+            f"The slot for tab {each} is not the one that its tab goes through."
+            for each in ("a1", "a2")
+        ],
         False,
     ),
     "slot of another label": (

@@ -74,6 +74,48 @@ def test_slots_that_follow_their_tabs_are_those_of_the_layout(tmp_path: Path) ->
     assert said(tmp_path, lambda document: None) == []
 
 
+def test_a_patch_may_be_turned_in_its_own_frame() -> None:
+    """Corners in the plane of the pattern are the same whatever the frame of their patch."""
+    document = json.loads((made("slots") / "layout.json").read_text())
+    before, pattern, labels = outlined_of(document)
+    for turn, patch in zip((30.0, -100.0), document["patches"], strict=True):
+        parts = [(patch, "outline_mm"), *((each, "polygon_mm") for each in patch["tabs"])]
+        for part, key in [*parts, *((each, "polygon_mm") for each in patch["slots"])]:
+            part[key] = turned(np.array(part[key]), turn).tolist()
+        patch["rotation_deg"] += turn
+    after, _, _ = outlined_of(document)
+    for one, other in zip(before.patches, after.patches, strict=True):
+        assert np.allclose(one.cut_lines[0], other.cut_lines[0], rtol=0, atol=1e-9)
+    assert np.allclose(before.tabs.points, after.tabs.points, rtol=0, atol=1e-9)
+    assert np.allclose(before.tabs.glued, after.tabs.glued, rtol=0, atol=1e-9)
+    layout = read_layout(json.dumps(document), made("slots") / "layout.json")
+    found = held(after, pattern, CARD, labels, "slots")
+    assert list(joint_faults(layout, pattern, found, labels, "slots")) == []
+
+
+def test_vertices_may_have_any_numbers() -> None:
+    """The first vertex is made a corner of the facet that a tab goes into."""
+    folder = made("slots")
+    layout = read_layout((folder / "layout.json").read_text(), folder / "layout.json")
+    pattern = mf.load(folder / "sheet.fold")
+    outlined, labels, _ = patches_on_sheets(layout, pattern)
+    assert list(joint_faults(layout, pattern, outlined, labels, "glue"))  # nothing is joined
+    for corner in pattern.faces_vertices[outlined.tabs.mate_face].ravel().tolist():
+        number = np.arange(len(pattern.vertices_coords))
+        number[[0, corner]] = corner, 0
+        other = replace(
+            pattern,
+            vertices_coords=pattern.vertices_coords[number],
+            folded_coords=pattern.folded_coords[number],
+            edges_vertices=number[pattern.edges_vertices],
+            faces_vertices=number[pattern.faces_vertices],
+            grid=None,
+        )
+        outlined, labels, _ = patches_on_sheets(layout, other)
+        found = held(outlined, other, CARD, labels, "slots")
+        assert list(joint_faults(layout, other, found, labels, "slots")) == []
+
+
 def test_a_head_that_is_no_wider_than_its_slot_does_not_lock(tmp_path: Path) -> None:
     locks, *others = said(tmp_path, lambda document: narrow(tab(document)))
     assert locks.startswith("Tab a1 does not lock: 5.")
@@ -238,6 +280,18 @@ def test_a_neck_fits_its_slot_and_a_head_is_wider(
     assert found == (
         [] if locks else [f"Tab a1 does not lock: {neck:.2f}, 10.00 and {head:.2f} mm wide."]
     )
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("low", [0.0, 0.35])
+def test_a_neck_is_as_wide_as_its_widest_part_in_the_slot(side: int, low: float) -> None:
+    """A bump of 0.1 mm beside a neck of 9 mm reaches 2 mm out, near either side of the slot."""
+    slot = shapely.Polygon([(0, 0), (10, 0), (10, 0.5), (0, 0.5)])
+    x = 5 + side * 5
+    bump = shapely.box(x - 2, low, x + 2, low + 0.1)
+    assert list(_lock_faults(slot, shapely.union(arrow(9.0, 13.0), bump), "a1")) == [
+        "Tab a1 does not lock: 11.50, 10.00 and 13.00 mm wide."
+    ]
 
 
 def test_a_tab_that_ends_in_its_slot_has_no_head() -> None:
