@@ -128,13 +128,13 @@ class GrblDriver(StreamDriver):
         """See :class:`StreamDriver`."""
         session, streamer = self._session, self._streamer
         poll_at = session.now()
-        heard = self._listened
+        silent = 0.0
         asked_last = False  # whether a status was asked for after the last acknowledgement
         while True:
             data = streamer.pull()
             if data:
                 session.write(data)
-            if streamer.finished and not asked_last and not session.awaits_status:
+            if streamer.finished and not asked_last:
                 asked_last = session.ask_status()
                 poll_at = session.now() + _END_POLL_S
             elif session.now() >= poll_at:
@@ -142,9 +142,9 @@ class GrblDriver(StreamDriver):
                 poll_at = session.now() + (_END_POLL_S if streamer.finished else _POLL_S)
             begin = session.now()
             events = session.receive(poll_at - begin)
-            self._listened += session.now() - begin
-            if session.heard >= begin:
-                heard = self._listened
+            waited = session.now() - begin
+            self._listened += waited
+            silent = 0.0 if events else silent + waited
             for event in events:
                 streamer.take(event)
                 self._watch_for_loss(event)
@@ -158,7 +158,7 @@ class GrblDriver(StreamDriver):
                     )
                     if asked_last and event.state in ("Idle", "Check"):
                         return
-            if self._listened - heard > ANSWER_S:
+            if silent > ANSWER_S:
                 raise ControllerError(
                     f"The controller has said nothing for {ANSWER_S:g} s, not even to status "
                     f"queries, {streamer.where}."

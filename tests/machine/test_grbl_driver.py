@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from session_walk import HOMING, MACHINE
@@ -11,6 +13,8 @@ from wires import FakeWire
 
 from miurafab.errors import ControllerError, PersonNeeded
 from miurafab.gcode.job import Job
+from miurafab.machine.known_controller import PortSetup
+from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.progress import Progress
 from miurafab.machine.sender import deliver
@@ -91,6 +95,33 @@ def test_a_lost_answer_is_told_before_the_progress_is_shown() -> None:
     assert 0.0 <= told - asked[-1] < 0.1
 
 
+def test_a_controller_that_is_silent_from_the_first_line_on_is_reset() -> None:
+    class Mute(FakeWire):
+        def read(self, timeout: float) -> bytes:
+            said = super().read(timeout)
+            return b"" if b"M4S0\n" in self.commands else said
+
+    wire = Mute(new_wire().device)
+    with pytest.raises(ControllerError, match="said nothing for 3 s"):
+        deliver(plan_job(Job("a.nc", "M4 S0\nG1 X20 S500 F60\nM5\n"), MACHINE), wire, StopSignals())
+    (first,) = [at for at, data in wire.written if b"M4S0" in data]
+    (reset, *_) = [at for at, data in wire.written if b"\x18" in data]
+    assert 2.9 <= reset - first <= 3.3
+
+
+def test_a_status_is_asked_for_five_times_a_second_and_ten_times_at_the_end() -> None:
+    wire = new_wire()
+    lines = "".join(f"G1 X{n % 2} S500 F60\n" for n in range(30)) + "G1 X20 F120\n"
+    job = Job("slow.nc", f"M4 S0\n{lines}")
+    seen: list[Progress] = []
+    deliver(plan_job(job, MACHINE), wire, StopSignals(), on_progress=seen.append)
+    flows = [now.seconds_elapsed for now in seen if now.in_flight]
+    ends = [now.seconds_elapsed for now in seen if not now.in_flight]
+    assert flows[-1] > 10
+    assert len(flows) == pytest.approx(5 * flows[-1], rel=0.05)
+    assert len(ends) == pytest.approx(10 * (ends[-1] - ends[0]), rel=0.05)
+
+
 # Pauses and holds
 
 
@@ -162,6 +193,23 @@ def test_a_pause_before_any_move_is_one() -> None:
     assert burnt(wire) == pytest.approx(20, abs=0.2)
 
 
+@pytest.mark.parametrize(
+    ("text", "force"),
+    [("M4 S0\nG1 X20 S500 F300\n", ""), ("M4 S0\nG1 X20 S500 F300\nM0\n$X\n", "program")],
+    ids=["nothing is owed", "nobody knows the program"],
+)
+def test_a_hold_where_no_pause_is_known_is_left_alone(text: str, force: str) -> None:
+    wire = new_wire()
+    options = SendOptions(force=frozenset({force} - {""}))
+    plan = replace(plan_job(Job("held.nc", text), MACHINE, options), at_pause="go on")
+    pressed_at_the_machine(wire, (2.0, b"!"), (9.0, b"~"), (20.0, b"~"))
+    seen: list[Progress] = []
+    deliver(plan, wire, StopSignals(), on_progress=seen.append)
+    assert wire.now() > 9.0
+    assert "Hold" in {now.state for now in seen}
+    assert b"~" not in wire.commands
+
+
 def test_a_hold_that_is_pressed_as_the_job_begins_is_left_alone() -> None:
     wire = new_wire()
     orders = [b"!"]
@@ -208,3 +256,43 @@ def test_a_machine_that_was_homed_and_then_refused_keeps_its_place() -> None:
     assert "reset" not in str(caught.value)
     assert b"$H\n" in wire.commands
     assert b"\x18" not in wire.commands
+
+
+def test_what_may_have_changed_is_asked_before_a_job_though_the_last_word_was_of_a_motion() -> None:
+    wire = new_wire()
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    session.say("G1 X10 F600")
+    assert session.state.state == "Run"
+    session.known.may_differ("$110=4000")
+    wire.device.advance(5.0)
+    sent = len(wire.commands)
+    session.cut(plan_job(Job("a.nc", "G0 X1\n"), MACHINE))
+    assert b"$$\n" in wire.commands[sent:]
+
+
+def test_a_journal_leaves_out_how_far_a_controller_plans_that_does_not_tell(tmp_path: Path) -> None:
+    class Reticent(FakeWire):
+        def read(self, timeout: float) -> bytes:
+            return re.sub(rb"\[OPT:(\w*),[\d,]*\]", rb"[OPT:\1]", super().read(timeout))
+
+    path = tmp_path / "journal"
+    wire = Reticent(new_wire().device)
+    plan = plan_job(Job("a.nc", "G0 X1\n"), MACHINE)
+    deliver(plan, wire, StopSignals(), journal_path=path)
+    assert b"blocks" not in path.read_bytes()
+    deliver(plan, new_wire(), StopSignals(), journal_path=path)
+    assert b'"blocks":15' in path.read_bytes().replace(b" ", b"")
+
+
+def test_each_refusal_that_was_forced_is_told() -> None:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE) | {110: 500.0}, baud=115_200))
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    session.open()
+    wire.device.power_cycle()
+    session.watch(1.0)
+    plan = plan_job(
+        Job("a.nc", "G0 X-1\n"),
+        MACHINE,
+        SendOptions(force=frozenset({"bounds", "position", "settings"})),
+    )
+    assert [each.code for each in session.cut(plan).findings] == ["bounds", "position", "settings"]
