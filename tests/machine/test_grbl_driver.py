@@ -19,6 +19,7 @@ from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.progress import Progress
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
+from miurafab.profiles import load_machine
 from miurafab.simulate.faults import parse_faults
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
@@ -255,6 +256,15 @@ def test_a_machine_that_was_homed_and_then_refused_keeps_its_place() -> None:
         deliver(plan, wire, StopSignals())
     assert "reset" not in str(caught.value)
     assert b"$H\n" in wire.commands
+    assert b"\x18" not in wire.commands
+
+
+def test_a_pen_that_a_job_leaves_down_is_no_armed_laser() -> None:
+    """Its servo is driven by the S of a spindle that stays on."""
+    pen = load_machine("grbl-pen-a4")
+    wire = FakeWire(VirtualGrbl(virtual_settings(pen), baud=115_200))
+    plan = plan_job(Job("pen.nc", "M3 S500\nG1 X20 F3000\n"), pen)
+    assert deliver(plan, wire, StopSignals()).findings == ()
     assert b"\x18" not in wire.commands
 
 
