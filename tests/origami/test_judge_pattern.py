@@ -18,7 +18,9 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.invariants import EXACT
 from miurafab.origami.judge_pattern import (
     _lie_together,
+    _these,
     gather,
+    judge,
     judge_quality,
     proved,
     unlisted_seams,
@@ -89,6 +91,19 @@ def test_one_thing_or_several_are_counted() -> None:
         "1 pair is",
         "2 pairs are",
     ]
+
+
+@pytest.mark.parametrize(
+    ("count", "noun", "says"),
+    [
+        (1, "edge", "Edge 0 is"),
+        (2, "vertex", "2 vertices (0, 1) are"),
+        (5, "facet", "5 facets (0, 1, 2, 3, 4) are"),
+        (6, "seam", "6 seams (0, 1, 2, 3, 4, ...) are"),
+    ],
+)
+def test_five_of_a_kind_are_named(count: int, noun: str, says: str) -> None:
+    assert _these(np.arange(count), noun) == says
 
 
 def test_a_whole_sheet_is_proved_sentence_by_sentence() -> None:
@@ -236,6 +251,35 @@ def test_an_edge_is_degenerate_below_a_millionth_of_the_mean() -> None:
     assert not any("degenerate" in each for each in said(ring))
     told = said(replace(ring, vertices_coords=shorter))
     assert sum("degenerate-edge: Edge 0 is" in each for each in told) == 1
+
+
+def test_residuals_count_from_what_is_exact_on_and_the_worst_comes_first() -> None:
+    pattern = regular()
+    evidence = gather(pattern)
+    found = evidence.residuals
+    assert found is not None
+
+    def codes(**worst: float) -> list[str]:
+        changed = {name: np.zeros_like(getattr(found, name)) for name in worst}
+        for name, value in worst.items():
+            changed[name][-1] = value
+        rough = replace(evidence, residuals=replace(found, **changed))
+        return [each.code for each in judge(pattern, rough)]
+
+    exact, over = found.exact, math.nextafter(found.exact, 1.0)
+    assert codes(planarity=exact, developability=exact, isometry=exact) == []
+    for name in ("planarity", "developability", "isometry"):
+        assert codes(**{name: over}) == [name]
+    assert codes(planarity=3e-7, developability=1e-7, isometry=2e-7) == [
+        "planarity",
+        "isometry",
+        "developability",
+    ]
+    assert codes(planarity=1e-7, developability=2e-7, isometry=3e-7) == [
+        "isometry",
+        "developability",
+        "planarity",
+    ]
 
 
 def test_a_seam_that_gapes_says_how_far() -> None:

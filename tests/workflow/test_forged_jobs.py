@@ -296,6 +296,18 @@ FORGED: dict[str, tuple[str, Callable[[Document], object], list[str], bool]] = {
         True,
     ),
     "mirror": ("double", lambda d: scaled(tab(d), 0.99), [MIRROR, MIRROR, P1], True),
+    "no mate, and another that is no mirror": (
+        "double",
+        lambda d: (d["patches"][2]["tabs"].pop(0), scaled(tab(d, 1, 1), 0.99)),
+        [
+            MIRROR.replace("a1", "b2"),
+            "Tab b4 has no mate on the other side of its seam.",
+            MIRROR.replace("a1", "b2"),
+            P1.replace("P1", "P2"),
+            P1.replace("P1", "P3"),
+        ],
+        True,
+    ),
     "held by glue": (
         "double",
         lambda d: tab(d).update(join="glue"),
