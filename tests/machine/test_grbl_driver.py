@@ -154,6 +154,32 @@ def test_a_hold_in_the_last_moves_before_a_pause_is_not_that_pause(end: str) -> 
     assert burnt(wire) == pytest.approx(30, abs=0.2)
 
 
+def test_a_hold_close_before_the_place_of_a_pause_is_not_that_pause() -> None:
+    wire = new_wire()
+    held: list[float] = []
+
+    def press(call: int) -> None:
+        if not held and wire.device.position[0] > 19.2:
+            held.append(wire.now())
+            wire.device.receive(b"!")
+        elif held and wire.now() > held[0] + 5.0:
+            wire.device.receive(b"~")
+            held[0] = 1e9
+
+    wire.before_call = press
+    job = Job("paused.nc", "M4 S0\nG1 X20 S500 F120\nM0\nG1 X30 F3000\nM5\n")
+    places: list[float] = []
+
+    def show(now: Progress) -> None:
+        if now.state == "Hold" and now.position:
+            places.append(now.position[0])
+
+    plan = replace(plan_job(job, MACHINE), at_pause="go on")
+    assert deliver(plan, wire, StopSignals(), on_progress=show).seconds > 14
+    assert 19.2 < max(places) < 19.85
+    assert wire.commands.count(b"~") == 1
+
+
 def test_a_hold_before_a_pause_ends_no_job_that_stops_at_pauses() -> None:
     job = Job("paused.nc", "M4 S0\nG1 X20 S500 F300\nM0\nG1 X30\nM5\n")
     wire = new_wire()
@@ -169,6 +195,7 @@ def test_a_hold_before_a_pause_ends_no_job_that_stops_at_pauses() -> None:
         ("", "G1 X20 S500 F3000\n"),
         ("", "G20\nG1 X0.7874 S500 F100\nG21\n"),
         ("", "G91\nG1 X20 S500 F3000\nG90\n"),
+        ("G0X5\n", "g91\nG1 X20 S500 F3000\nG90\n"),
         ("", "G92 X5\nG1 X25 S500 F3000\n"),
         ("", "G1 X20 S500 F3000\nG53 G0 X0\nG0 X20\n"),
         ("", "G1 X10 S500 F3000\nG2 X20 I5\n"),

@@ -10,7 +10,7 @@ import pytest
 from session_walk import JOB, MACHINE
 from wires import FakeWire
 
-from miurafab.errors import ControllerError
+from miurafab.errors import ControllerError, JobStopped
 from miurafab.gcode.job import Job
 from miurafab.grbl.streamer import LineRefused
 from miurafab.machine.journal import read_journal
@@ -124,6 +124,23 @@ def test_keys_are_heeded_again_after_a_stop_and_none_of_those_pressed_meanwhile(
     keys.keys = "+"
     session.watch(0.2)
     assert wire.commands.endswith(b"\x91")
+
+
+def test_a_key_in_a_job_is_its_drivers_however_early_it_is_looked_at() -> None:
+    """A session acts on keys by itself while no job runs: it would not know that the job ended."""
+    wire, keys = new_wire(), Pressed()
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), keys)
+    write = wire.write
+
+    def pressing(data: bytes) -> None:
+        write(data)
+        if data == b"?" and wire.device.beam_log:
+            keys.keys = "q"
+
+    wire.write = pressing  # type: ignore[method-assign]
+    with pytest.raises(JobStopped, match=r"^rows\.nc was stopped at the keyboard; "):
+        session.cut(JOB)
+    assert wire.commands.endswith(b"!\x18")
 
 
 def test_a_session_that_was_left_is_left_once() -> None:
