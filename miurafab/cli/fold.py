@@ -83,7 +83,7 @@ def fold(
     from miurafab.workflow.panels import thickness_report
 
     with console.progress("folding") as progress:
-        folding = miurafab.fold(pattern, asked.steps, on_progress=progress)
+        folding = miurafab.fold(pattern, asked.steps, timeout=asked.timeout, on_progress=progress)
         thick = None
         if asked.thickness_mm is not None:
             thick = miurafab.thick_panels(

@@ -9,6 +9,7 @@ vertices along straight lines, which no paper could follow.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from miurafab.display import Shown
+from miurafab.errors import InputError
 from miurafab.files import AnyPath, new_file, write_bytes, write_text
 from miurafab.findings import Finding, findings_json
 from miurafab.geometry.arrays import Floats
@@ -245,12 +247,16 @@ def _verdict(verdict: RampVerdict) -> dict[str, Any]:
     }
 
 
-described(Folding.save, FoldOptions, without=("steps", "thickness", "method"))
+described(Folding.save, FoldOptions, without=("steps", "timeout", "thickness", "method"))
 
 
 @verb
 def fold(
-    pattern: PatternLike, steps: int | None = None, *, on_progress: Progress | None = None
+    pattern: PatternLike,
+    steps: int | None = None,
+    *,
+    timeout: float | None = None,
+    on_progress: Progress | None = None,
 ) -> Folding:
     """Compute the folding motion of a pattern.
 
@@ -276,7 +282,9 @@ def fold(
     PatternError
         For a file that holds no pattern, and for a pattern whose creases do not fold together.
     OptionError
-        For ``steps`` out of range.
+        For ``steps`` or a ``timeout`` out of range.
+    InputError
+        If the ``timeout`` passes before the motion is found.
 
     Examples
     --------
@@ -284,12 +292,31 @@ def fold(
     >>> mf.fold(mf.fit("plane", facets=(4, 4)), steps=10)
     <Folding rigid, 11 frames of 16 facets, no contacts>
     """
-    steps = read_options(FoldOptions, {"steps": steps}).steps
+    asked = read_options(FoldOptions, {"steps": steps, "timeout": timeout})
+    steps, on_progress = asked.steps, _until(asked.timeout, on_progress)
     pattern = movable_pattern(pattern)
     found = find_motion(pattern, steps, on_progress)
     closed = found.motion.is_rigid and found.motion.method == CLOSED_FORM
     order = layer_order(found.motion.pattern) if closed else None
     return Folding(found, contacts(found.motion, on_progress), order)
+
+
+def _until(timeout: float | None, on_progress: Progress | None) -> Progress | None:
+    """``on_progress``, which ends what tells of its progress after ``timeout`` seconds."""
+    if timeout is None:
+        return on_progress
+    end = time.monotonic() + timeout
+
+    def told(part: float, text: str) -> None:
+        if time.monotonic() > end:
+            raise InputError(
+                f"No motion was found within the {timeout:g} s of `timeout`: the search was at "
+                f"{text}. Give it more time, or ask for fewer `steps`."
+            )
+        if on_progress is not None:
+            on_progress(part, text)
+
+    return told
 
 
 described(fold, FoldOptions, without=("colour", "thickness", "method"))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from miurafab.errors import OptionError
-from miurafab.options import Choice, Whole, length, option
+from miurafab.options import Choice, Whole, length, number, option
 
 ENDINGS = (".fold", ".gif", ".glb", ".html")
 """What a motion can be written as."""
@@ -30,6 +30,11 @@ class FoldOptions:
     thickness_mm: float | None = option(
         length(above=True),
         "Also say how to make panels of this thickness; exit 1 if such panels cannot fold.",
+    )
+    timeout: float | None = option(
+        number(0, above=True),
+        "Give up after so many seconds, if no motion is found up to then.",
+        default_text="none",
     )
     method: str = option(
         Choice(METHODS),

@@ -6,9 +6,11 @@ import csv
 import io
 import json
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 
+import named_patterns
 import numpy as np
 import pytest
 from PIL import Image
@@ -50,6 +52,22 @@ def developable(name: str) -> CreasePattern:
     found = fitted(name, 10, 10).pattern
     assert found is not None
     return found
+
+
+def test_a_motion_that_takes_longer_than_its_timeout_is_given_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also where a way that is lost would lead to another, and in the middle of a descent."""
+    clock = iter(range(1000))
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(clock)))
+    told: list[str] = []
+    pattern = named_patterns.waterbomb_base()
+    with pytest.raises(InputError, match=r"within the 2 s of 'timeout'.* step 1 of 4, round 3"):
+        fold(pattern, 4, timeout=2.0, on_progress=lambda part, text: told.append(text))
+    assert told == ["step 1 of 4, round 1", "step 1 of 4, round 2"]
+    with pytest.raises(InputError, match="'timeout'"):
+        fold(pattern, 4, timeout=-1.0)
+    assert len(fold(pattern, 4, timeout=999.0).motion.frames) == 5
 
 
 def test_frames_of_a_wish_are_named_by_their_part_of_it(tmp_path: Path) -> None:

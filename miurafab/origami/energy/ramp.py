@@ -17,6 +17,7 @@ with mu after Levenberg and Marquardt. So it only ever lowers the energy.
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -175,18 +176,21 @@ def descend(
     rounds: int,
     leash: float = np.inf,
     mu: float = FIRST_MU,
+    on_round: Callable[[int], None] | None = None,
 ) -> Descent:
     """Lower the energy from ``points`` (V, 3) until no force is above ``force``.
 
     It takes at most ``rounds`` steps, and ends before points come nearer to each other by ``leash``
     (:func:`nearing`). No step leads through what touches. All bars need a compliance. ``ramped``
-    accepts each step.
+    accepts each step. ``on_round`` is told the number of each step before it.
     """
     start, energy = points, ramped.energy(points, target)
     down, leashed = _Downhill(ramped, points, target), False
-    for _ in range(rounds):
+    for number in range(rounds):
         if down.force <= force or mu > GREATEST_MU or leashed:
             break
+        if on_round is not None:
+            on_round(number)
         step = down.step(mu)
         if step is None:
             mu *= BLUNTER

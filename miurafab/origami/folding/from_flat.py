@@ -99,9 +99,15 @@ def fold_from_flat(
     if touching:
         hinges = np.concatenate([model.hinges, model.creases])
         near = NearPairs(model.triangles, pattern.edges_vertices, hinges, model.points)
-    walk = RampWalk(model, near, np.random.default_rng(seed))
-    start = linear_seed(model)
     frames: list[RampFrame] = []
+
+    def tell(rounds: int) -> None:
+        if on_progress is not None:
+            done, steps = len(frames), len(parts) - 1
+            on_progress(done / steps, f"step {done + 1} of {steps}, round {rounds + 1}")
+
+    walk = RampWalk(model, near, np.random.default_rng(seed), tell)
+    start = linear_seed(model)
     nominal = float(parts[1]) / finer
     found = any(walk.leave_flat(start.heights, nominal * first) for first in FIRST_PARTS)
     for number, part in enumerate(parts[1:].tolist()):

@@ -11,6 +11,7 @@ down in steps that nothing blocks, and so ends in a balance that the sheet can r
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,12 +94,18 @@ class RampFrame:
 class RampWalk:
     """Where a sheet is on the ramp, the last states, and the length of the next step.
 
-    With ``near`` its facets do not pass through each other.
+    With ``near`` its facets do not pass through each other. ``on_round`` is called before each step
+    of a descent, and with 0 before each step along the ramp.
     """
 
     def __init__(
-        self, model: BarHingeModel, near: NearPairs | None, random: np.random.Generator
+        self,
+        model: BarHingeModel,
+        near: NearPairs | None,
+        random: np.random.Generator,
+        on_round: Callable[[int], None] | None = None,
     ) -> None:
+        self._on_round = on_round
         self._soft = Ramped(model)
         firmer = np.where(model.rest == 0, FIRMER, 1.0) * model.stiffness
         firmer[model.ruled] = model.stiffness[model.ruled]
@@ -126,6 +133,8 @@ class RampWalk:
     def reach(self, goal: float, nominal: float) -> bool:
         """Follow the path up to ``goal``, in steps of ``nominal`` at most; False if it is lost."""
         while self._known[-1].drive < goal - 1e-12:
+            if self._on_round is not None:
+                self._on_round(0)
             here = self._known[-1]
             part = min(goal, here.drive + nominal * self._step)
             found = self._solved(self._soft, extrapolate(self._known, part), part, self._factored)
@@ -214,11 +223,12 @@ class RampWalk:
         before each which facets are near each other.
         """
         if self._near is None:
-            return descend(self._soft, points, part, ENOUGH, ROUNDS)
+            return descend(self._soft, points, part, ENOUGH, ROUNDS, on_round=self._on_round)
         ended = Descent(points, np.inf)
         for _ in range(MOST_PIECES):
             self._look(ended.points, REACH)
-            ended = descend(self._soft, ended.points, part, ENOUGH, PIECE_ROUNDS, LEASH, ended.mu)
+            here, mu = ended.points, ended.mu
+            ended = descend(self._soft, here, part, ENOUGH, PIECE_ROUNDS, LEASH, mu, self._on_round)
             if not ended.leashed:
                 break
         self._arm(ended.points, ARMED)

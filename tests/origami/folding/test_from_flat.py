@@ -352,7 +352,12 @@ def test_the_way_from_flat_tells_how_far_it_is() -> None:
     pattern = named_patterns.waterbomb_base()
     parts = ramp_parts(pattern, 3)
     fold_from_flat(pattern, parts, on_progress=lambda *each: told.append(each))
-    assert told == [(k / 3, f"step {k} of 3") for k in (1, 2, 3)]
+    done = [each for each in told if "round" not in each[1]]
+    assert done == [(k / 3, f"step {k} of 3") for k in (1, 2, 3)]
+    # and within each step, the first of which is a descent
+    assert told[:3] == [(0.0, f"step 1 of 3, round {k}") for k in (1, 2, 3)]
+    assert [part for part, _ in told] == sorted(part for part, _ in told)
+    assert {(2 / 3, "step 3 of 3, round 1"), (1 / 3, "step 2 of 3, round 1")} <= set(told)
 
 
 def test_a_balance_is_found_where_rounding_lets_no_force_fall_further() -> None:
