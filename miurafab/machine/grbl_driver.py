@@ -17,8 +17,7 @@ import numpy as np
 
 from miurafab.errors import ControllerError, MiurafabError, PersonNeeded
 from miurafab.findings import Finding
-from miurafab.gcode.program import BEAM_M3, PAUSE
-from miurafab.geometry.arrays import Floats
+from miurafab.gcode.program import BEAM_M3, PAUSE, Program
 from miurafab.grbl.events import Error, Event, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S, RESTARTED
@@ -45,6 +44,8 @@ _WAS_ARMED = Finding("armed", "The job ended with the laser armed, so the contro
 _OTHER_PLACES = re.compile(r"G\s*0*(?:10|28|30|38|43|5[3-9]|9[12])", re.IGNORECASE)
 """Steps, the machine's own or stored places, and other origins than that of the job."""
 
+_DONE = ("Idle", "Check")
+"""The states of a controller that does nothing, in a job that burns and in check mode."""
 _NEAR_MM = 0.1  # more than a step of a motor
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # between status queries while the last moves are made
@@ -156,7 +157,7 @@ class GrblDriver(StreamDriver):
                         session.connection.in_flight_bytes,
                         session.overrides,
                     )
-                    if asked_last and event.state in ("Idle", "Check"):
+                    if asked_last and event.state in _DONE:
                         return
             if silent > ANSWER_S:
                 raise ControllerError(
@@ -175,7 +176,7 @@ class GrblDriver(StreamDriver):
             return None
         line = owed[0].number  # GRBL answers M0 when its hold is over, and all before it earlier
         pauses = np.flatnonzero((program.event_line == line) & (program.event_kind == PAUSE))
-        if not len(pauses) or not self._has_come_to(program.end[: program.event_move[pauses[0]]]):
+        if not len(pauses) or not self._has_come_to(program, program.event_move[pauses[0]]):
             return None
         where = f"{self.plan.job.name}, line {line}"
         if self.plan.at_pause == "stop":
@@ -187,14 +188,16 @@ class GrblDriver(StreamDriver):
             self.orders.append(RESUME)
         return f"waiting at {where} (M0): r goes on"
 
-    def _has_come_to(self, ends: Floats) -> bool:
-        """Whether the head may stand where the last of the moves to ``ends`` (n, 3) ends, in mm: a
-        hold of somebody at the machine stops it before. An axis that stays where the job began
-        tells nothing, nor does a job that names places otherwise than in its own coordinates.
+    def _has_come_to(self, program: Program, moves: int) -> bool:
+        """Whether the head may stand where the first ``moves`` of ``program`` end: a hold of
+        somebody at the machine stops it before. An axis that each line leaves where the job began
+        (an arc may leave it on the way) tells nothing, nor does a job that names places otherwise
+        than in its own coordinates.
         """
         position = self._session.position
-        if position is None or not len(ends) or self._names_other_places:
+        if position is None or not moves or self._names_other_places:
             return True
+        ends = program.end[:moves][np.diff(program.line[:moves], append=0) != 0]
         return all(
             abs(ends[-1, axis] - at) < _NEAR_MM
             for axis, at in enumerate(position[:3])
@@ -242,7 +245,7 @@ class GrblDriver(StreamDriver):
     def _watch_for_loss(self, event: Event) -> None:
         """Raise if the controller idles while an answer is missing: the line was damaged."""
         owed = self._session.connection.in_flight
-        if not (isinstance(event, StatusReport) and event.state == "Idle" and owed):
+        if not (isinstance(event, StatusReport) and event.state in _DONE and owed):
             if isinstance(event, Ok | Error | StatusReport):
                 self._idle_at = None
             return

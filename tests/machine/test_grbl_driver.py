@@ -43,6 +43,15 @@ def dawdling(
     return show
 
 
+def within_a_minute(wire: FakeWire) -> None:
+    """What would go on for ever fails."""
+
+    def look(call: int) -> None:
+        assert wire.now() < 60
+
+    wire.before_call = look
+
+
 def test_who_dawdles_while_the_controller_dwells_loses_no_answer() -> None:
     """It idles while it dwells; what the program misses meanwhile is no loss."""
     wire = new_wire()
@@ -94,6 +103,21 @@ def test_a_lost_answer_is_told_before_the_progress_is_shown() -> None:
     (told, *_) = [at for at, data in wire.written if b"\x18" in data]
     asked = [at for at, data in wire.written if data == b"?" and at < told]
     assert 0.0 <= told - asked[-1] < 0.1
+
+
+def test_an_answer_that_is_lost_in_check_mode_ends_the_reading() -> None:
+    """The controller then stays in the state Check, whatever it waits for."""
+    wire = new_wire("drop-reply=4@1500")
+    within_a_minute(wire)
+    moves = "".join(f"G1 X{20 + n % 2}\n" for n in range(400))
+    plan = plan_job(
+        Job("read.nc", f"M4 S500 F3000\n{moves}M5\n"), MACHINE, SendOptions(check_mode=True)
+    )
+    with pytest.raises(ControllerError, match=r"not answered line 402 of read\.nc for 3 s"):
+        deliver(plan, wire, StopSignals())
+    assert wire.commands.endswith(b"\x18")
+    wire.settle()
+    assert not wire.device.beam_log
 
 
 def test_a_controller_that_is_silent_from_the_first_line_on_is_reset() -> None:
@@ -200,6 +224,9 @@ def test_a_hold_before_a_pause_ends_no_job_that_stops_at_pauses() -> None:
         ("", "G1 X20 S500 F3000\nG53 G0 X0\nG0 X20\n"),
         ("", "G1 X10 S500 F3000\nG2 X20 I5\n"),
         ("G0X0Y7\n", "G1 X20 S500 F3000\n"),
+        ("G0X0Y7\n", "G1 X10 S500 F3000\nG2 X20 I5\n"),
+        ("G0X0Y7\n", "G1 X10 S500 F3000\nG3 X0 R5\nG1 X20\n"),
+        ("G0X0Y7\n", "G1 X20 S500 F3000\nG2 X20 J5\n"),
         ("G10L2P1X3Y4\n", "G1 X20 S500 F3000\n"),
     ],
 )
@@ -210,6 +237,7 @@ def test_a_pause_is_known_wherever_the_program_says_that_it_is(before: str, move
         wire.device.receive(before.encode())
         wire.device.advance(5.0)
         wire.device.take_output()
+    within_a_minute(wire)
     deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
     assert wire.commands.count(b"~") == 1
 
