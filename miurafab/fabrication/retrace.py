@@ -102,7 +102,7 @@ def _same_labels(told: tuple[AbsentLabel, ...], own: tuple[AbsentLabel, ...]) ->
         )
         for one, other in zip(told, own, strict=True)
     ]
-    return np.allclose(apart, 0.0, rtol=0, atol=NEAR_MM)
+    return np.allclose(apart, 0.0, atol=NEAR_MM)
 
 
 def patches_on_sheets(

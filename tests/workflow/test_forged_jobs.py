@@ -196,6 +196,7 @@ FORGED: dict[str, tuple[str, Callable[[Document], object], list[str], bool]] = {
         ["The rows and angles of the folder's kit are not those of the pattern."],
         False,
     ),
+    "no kit": ("glue", lambda d: d.pop("kit"), [], False),
     "absent label": (
         "glue",
         absent,

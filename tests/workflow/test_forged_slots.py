@@ -323,3 +323,9 @@ def test_an_absent_label_is_told_by_its_place_and_text(changes: Any, same: bool)
     assert _same_labels((absent(**changes),), (absent(),)) is same
     assert _same_labels((absent(), absent(**changes)), (absent(), absent())) is same
     assert not _same_labels((absent(),), ())
+
+
+def test_absent_labels_that_are_turned_alike_are_the_same() -> None:
+    one = absent(rotation_deg=30.0)
+    assert _same_labels((one,), (absent(rotation_deg=390.0),))
+    assert not _same_labels((one,), (absent(rotation_deg=-30.0),))
