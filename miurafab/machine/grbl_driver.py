@@ -195,7 +195,7 @@ class GrblDriver(StreamDriver):
         than in its own coordinates.
         """
         position = self._session.position
-        if position is None or not moves or self._names_other_places:
+        if position is None or self._names_other_places:
             return True
         ends = program.end[:moves][np.diff(program.line[:moves], append=0) != 0]
         return all(

@@ -242,6 +242,18 @@ def test_a_pause_is_known_wherever_the_program_says_that_it_is(before: str, move
     assert wire.commands.count(b"~") == 1
 
 
+@pytest.mark.parametrize("place", [b"", rb"\1,0.000"], ids=["none", "four axes"])
+def test_a_pause_is_known_whatever_of_the_place_is_reported(place: bytes) -> None:
+    class Retold(FakeWire):
+        def read(self, timeout: float) -> bytes:
+            return re.sub(rb"(\|MPos:[^|>]*)", place, super().read(timeout))
+
+    wire = Retold(new_wire().device)
+    job = Job("paused.nc", "M4 S0\nG1 X20 S500 F3000\nM0\nG4 P0.1\nM5\n")
+    deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
+    assert wire.commands.count(b"~") == 1
+
+
 def test_a_pause_before_any_move_is_one() -> None:
     wire = new_wire()
     job = Job("paused.nc", "M0\nM4 S0\nG1 X20 S500 F3000\nM5\n")
