@@ -224,6 +224,12 @@ FORGED: dict[str, tuple[str, Callable[[Document], object], list[str], bool]] = {
         ["The slot for tab a1 is not the one that its tab goes through."],
         False,
     ),
+    "slot moved by little": (
+        "slots",
+        lambda d: moved(slot(d), 0.00015, 0.0),
+        ["The slot for tab a1 is not the one that its tab goes through."],
+        False,
+    ),
     "slot of another tab": (
         "slots",
         lambda d: slot(d).update(tab=2),
