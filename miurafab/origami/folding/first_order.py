@@ -83,10 +83,10 @@ def waiting_folds(pattern: CreasePattern) -> Ints:
     return np.sort(np.concatenate([waiting, folds[best.x[:count] < 0.5]]))
 
 
-def refuse_locked(pattern: CreasePattern) -> None:
+def refuse_locked(pattern: CreasePattern, edges: Ints) -> None:
     """Raise :class:`~miurafab.errors.PatternError` for a large ``pattern`` half of whose folds
     cannot begin for what is around single vertices, beside folds of curved creases, where facets
-    bend in any case.
+    bend in any case. The message names them by their numbers ``edges`` (E,) in the whole sheet.
     """
     if len(pattern.vertices_coords) <= MOST_BENT:
         return
@@ -97,11 +97,11 @@ def refuse_locked(pattern: CreasePattern) -> None:
     if not len(folds) or 2 * len(waiting) < len(folds):
         return
     raise PatternError(
-        f"The pattern was not folded: with flat facets {len(waiting)} of its {len(folds)} folds "
-        f"cannot begin from flat if none shall turn to its wrong side, the first being edge "
-        f"{waiting[0]}. Either letters are wrong, or it folds in a sequence, or its facets have to "
-        f"bend from the start, which is looked for in sheets of up to {MOST_BENT} vertices (it has "
-        f"{len(pattern.vertices_coords)}). Fold a part of it."
+        f"The pattern was not folded: with flat facets {len(waiting)} of its {len(ends.folds)} "
+        f"folds cannot begin from flat if none shall turn to its wrong side, the first being edge "
+        f"{edges[waiting[0]]}. Either letters are wrong, or it folds in a sequence, or its facets "
+        f"have to bend from the start, which is looked for in sheets of up to {MOST_BENT} vertices "
+        f"(it has {len(pattern.vertices_coords)}). Fold a part of it."
     )
 
 

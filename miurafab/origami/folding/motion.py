@@ -82,9 +82,9 @@ def find_motion(
     """
     pattern = cut_open(pattern)
     first_facets(pattern, place(pattern, np.zeros((1, len(pattern.edges_vertices)))).depth)
-    if pattern.folded_coords is None:
-        refuse_locked(pattern)
     lean = without_flat_edges(pattern)
+    if pattern.folded_coords is None:
+        refuse_locked(lean.pattern, lean.edges)
     found = _find(lean.pattern, steps, on_progress)
     verdict = found.verdict
     if verdict is not None:

@@ -140,11 +140,15 @@ def test_opposite_folds_of_one_letter_turn_and_those_across_them_do_not() -> Non
 
 
 def cross(letters: str) -> CreasePattern:
+    return named_patterns.drawn(cross_lines(letters))
+
+
+def cross_lines(letters: str, angle: float = 90.0) -> list[Any]:
     """Two lines that cross, their four halves of ``letters``, going round."""
     lines = named_patterns.border((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
     tips = ((2.0, 1.0), (1.0, 2.0), (0.0, 1.0), (1.0, 0.0))
-    lines += [((1.0, 1.0), tip, letter, 90.0) for tip, letter in zip(tips, letters, strict=True)]
-    return named_patterns.drawn(lines)
+    halves = zip(tips, letters, strict=True)
+    return [*lines, *(((1.0, 1.0), tip, letter, angle) for tip, letter in halves)]
 
 
 def test_a_program_without_an_answer_tells_what_waits_at_single_vertices(
@@ -164,3 +168,24 @@ def test_a_large_sheet_whose_folds_wait_is_refused_at_once(monkeypatch: pytest.M
         with pytest.raises(PatternError, match=r"flat facets 6 of its 12 folds .* \(it has 16\)"):
             find_motion(folded_map("VVVVVVVMVVMV"), 4)
     assert len(find_motion(named_patterns.miura(4), 4).motion.frames) == 5
+
+
+def test_vertices_that_only_flat_edges_have_make_no_sheet_large(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They are left out before the sheet is folded, which then has 9, and half of its folds wait;
+    a fold is named by its number in the drawing.
+    """
+    lines: list[Any] = [((0.0, 0.0), (1.0, 1.0), "F", 0.0)]
+    for k in (0.25, 0.5, 0.75):
+        lines += [((k, 0.25), (k, 0.75), "F", 0.0), ((0.25, k), (0.75, k), "F", 0.0)]
+    pattern = named_patterns.drawn([*lines, *cross_lines("VVVM", 180.0)])
+    assert len(pattern.vertices_coords) > 12
+    monkeypatch.setattr(first_order, "MOST_BENT", 9)
+    assert len(find_motion(pattern, 4).motion.frames) == 5
+    monkeypatch.setattr(first_order, "MOST_BENT", 8)
+    with pytest.raises(PatternError, match=r" 2 of its 4 folds .* \(it has 9\)") as told:
+        find_motion(pattern, 4)
+    first = min(waiting_folds(pattern))
+    assert first != min(waiting_folds(cross("VVVM")))
+    assert f"the first being edge {first}." in str(told.value)
