@@ -11,7 +11,7 @@ import pytest
 from session_walk import HOMING, MACHINE
 from wires import FakeWire
 
-from miurafab.errors import ControllerError, PersonNeeded
+from miurafab.errors import ControllerError, JobStopped, PersonNeeded
 from miurafab.gcode.job import Job
 from miurafab.machine.known_controller import PortSetup
 from miurafab.machine.machine_session import MachineSession
@@ -373,3 +373,31 @@ def test_each_refusal_that_was_forced_is_told() -> None:
         SendOptions(force=frozenset({"bounds", "position", "settings"})),
     )
     assert [each.code for each in session.cut(plan).findings] == ["bounds", "position", "settings"]
+
+
+class Abort:
+    """q, pressed after two seconds."""
+
+    def __init__(self, wire: FakeWire) -> None:
+        self._wire = wire
+
+    def pressed(self) -> str:
+        return "q" * (self._wire.now() > 2.0)
+
+
+@pytest.mark.parametrize(
+    ("machine", "text", "end"),
+    [
+        ("grbl-pen-a4", "M3 S500\nG1 X20 F300\n", b"!\x18"),
+        ("grbl-laser-400", "M4 S500\nG1 X20 F300\nG99\n", b"\x18"),
+    ],
+    ids=["a pen", "a program that nobody knows"],
+)
+def test_an_abort_holds_first_where_no_beam_can_stand(machine: str, text: str, end: bytes) -> None:
+    profile = load_machine(machine)
+    wire = FakeWire(VirtualGrbl(virtual_settings(profile), baud=115_200))
+    job = Job("a.nc", text.replace("G99\n", "G4 P9\nG99\n"))
+    plan = plan_job(job, profile, SendOptions(force=frozenset({"program"})))
+    with pytest.raises(JobStopped, match="stopped at the keyboard"):
+        deliver(plan, wire, StopSignals(), keys=Abort(wire))
+    assert wire.commands.rpartition(b"\n")[2] == end
