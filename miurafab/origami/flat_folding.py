@@ -196,7 +196,7 @@ def judge_flat_folding(pattern: CreasePattern) -> Iterator[Finding]:
         f"vertex {first}"
     )
     if folded_flat and not pattern.angles_assumed:
-        says = f"{many}: {faults[first]}. The file gives all folds as 180 degrees."
+        says = f"{many}: {faults[first]}. The file gives all folds as 180 degrees, or no angle."
         yield Finding("flat-folding", says, tuple(sorted(faults)))
     else:
         says = f"{many}: {faults[first]}. That matters only if the sheet is to be folded flat."

@@ -230,10 +230,12 @@ def parse_fold(document: Any) -> CreasePattern:
     flat = np.ascontiguousarray(points_at(key, "vertices_coords")[:, :2] * factor)
     edges = edges_in(key)
     assignment = assignments_in(key, len(edges))
+    own = fold_angles_in(key, assignment, np.nan)
+    unsized = told_without_sizes(key, assignment)
     given = "faces_vertices" in key
     if not given and len(frames) == 1 and _are_lines(flat, edges, assignment):
-        angles = fold_angles_in(key, assignment, np.nan)
-        return pattern_from_lines(CreaseLines(flat[edges], assignment, angles))
+        drawn = pattern_from_lines(CreaseLines(flat[edges], assignment, own))
+        return replace(drawn, told=(*drawn.told, *unsized))
     faces = faces_in(key) if given else enclosed_facets(flat, edges, assignment)
     if faces.max() >= len(flat):  # before something is made as large as that number
         raise PatternError("'faces_vertices' refers to a vertex that does not exist.")
@@ -271,10 +273,8 @@ def parse_fold(document: Any) -> CreasePattern:
             points_at(chosen, "vertices_coords"),
         )
     if pattern.folded_coords is not None:
-        own = np.isfinite(fold_angles_in(key, assignment, np.nan))
-        pattern = with_angles_of_the_folded_form(pattern, own)
-    unsized = told_without_sizes(key, assignment)
-    if unsized and pattern.folded_coords is None:
+        pattern = with_angles_of_the_folded_form(pattern, np.isfinite(own))
+    elif unsized:
         pattern = replace(pattern, angles_assumed=True, told=(*pattern.told, *unsized))
     further = sum("foldedForm" in classes_of(frame) for frame in frames) > 1
     return pattern if further else _without_loose_vertices(pattern)

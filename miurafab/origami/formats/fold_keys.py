@@ -155,14 +155,16 @@ def fold_angles_in(
 def told_without_sizes(
     document: Mapping[str, Any], assignment: NDArray[np.str_]
 ) -> tuple[Finding, ...]:
-    """The finding on a file whose angles are there, and tell of no mountain or valley how far it
-    folds.
-    """
+    """The finding on a file that gives mountains and valleys as 0 degrees, and none as more."""
     folds = np.isin(assignment, ("M", "V"))
-    known = np.isfinite(fold_angles_in(document, assignment, math.nan)[folds]).any()
-    if known or not folds.any() or document.get("edges_foldAngle") is None:
+    known = np.isfinite(fold_angles_in(document, assignment, math.nan))
+    given = [angle is not None for angle in document.get("edges_foldAngle") or [None] * len(folds)]
+    if known[folds].any() or not np.array(given)[folds].any():
         return ()
-    says = "The file gives every fold as 0 degrees, so no size is known."
+    says = (
+        "The file gives no fold an angle but 0 degrees, so no size is known: mountains and valleys "
+        "are taken to fold by 180."
+    )
     return (Finding("not-proven", says),)
 
 

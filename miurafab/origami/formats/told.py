@@ -74,7 +74,7 @@ def _told(
     if len(holes):
         says = (
             f"{_many(len(holes), 'part')} of the drawing, with borders alone around, "
-            f"{'holds' if len(holes) == 1 else 'hold'} no paper, {100 * holes.sum():.2g} % of its "
+            f"{'holds' if len(holes) == 1 else 'hold'} no paper, {100 * holes.sum():.3g} % of its "
             "area"
         )
         way = "; draw a flat line (F) in each that is paper" if holes.sum() > 0.5 else ""

@@ -324,7 +324,10 @@ def test_folds_that_are_all_given_as_0_degrees_fold_by_their_letters(tmp_path: P
     assert np.array_equal(found.edges_fold_angle, meant.edges_fold_angle)
     assert found.angles_assumed
     said = [each.sentence for each in check(files[0]).findings]
-    assert said[0] == "The file gives every fold as 0 degrees, so no size is known."
+    assert said[0] == (
+        "The file gives no fold an angle but 0 degrees, so no size is known: mountains and valleys "
+        "are taken to fold by 180."
+    )
     assert not [sentence for sentence in said if "fold flat" in sentence]
     order, other = (layers(file).order for file in files)
     assert order is not None
@@ -334,3 +337,28 @@ def test_folds_that_are_all_given_as_0_degrees_fold_by_their_letters(tmp_path: P
     half = {**still, "edges_foldAngle": [0.0] * len(still["edges_vertices"])}
     half["edges_foldAngle"][half["edges_assignment"].index("M")] = -10.0
     assert np.degrees(parse_fold(half).edges_fold_angle) == pytest.approx(half["edges_foldAngle"])
+
+
+@pytest.mark.parametrize(("given", "told"), [(0, True), (None, False)])
+def test_what_a_file_gives_no_size_of_is_told_where_it_gives_0(
+    given: int | None, told: bool
+) -> None:
+    """In lines that cross, of which facets are yet to be made, as where the file has them. An angle
+    that is null is none, as where there are no angles.
+    """
+    file = {
+        "vertices_coords": [[0, 0], [4, 0], [4, 4], [0, 4], [0, 2], [4, 2], [2, 0], [2, 4]],
+        "edges_vertices": [[0, 6], [6, 1], [1, 5], [5, 2], [2, 7], [7, 3], [3, 4], [4, 0]],
+        "edges_assignment": [*"BBBBBBBB", "V", "M"],
+        "edges_foldAngle": [0] * 8 + [given] * 2,
+    }
+    file["edges_vertices"] += [[4, 5], [6, 7]]
+    drawing = parse_fold(file)
+    assert len(drawing.faces_vertices) == 4
+    sheet = json.loads(fold_text(drawing))
+    del sheet["miurafab:angles"]
+    sheet["edges_foldAngle"] = [given] * len(sheet["edges_vertices"])
+    for found in (drawing, parse_fold(sheet)):
+        folds = np.isin(found.edges_assignment, ("M", "V"))
+        assert np.abs(np.degrees(found.edges_fold_angle[folds])) == pytest.approx([180] * 4)
+        assert [each.code for each in found.told] == ["not-proven"] * told

@@ -306,7 +306,7 @@ def test_a_part_without_paper_is_told() -> None:
     found = pattern_from_lines(drawn(*SQUARE, *inner, ("V", 0, 0, 0.5, 0.5), ("M", 1, 1, 2, 2)))
     assert [finding.code for finding in found.told] == ["holes"]
     assert found.told[0].sentence == (
-        "1 part of the drawing, with borders alone around, holds no paper, 3.1 % of its area."
+        "1 part of the drawing, with borders alone around, holds no paper, 3.12 % of its area."
     )
 
 
@@ -324,3 +324,7 @@ def test_paper_that_passes_for_a_hole_is_told_with_the_way_out() -> None:
     whole = pattern_from_lines(drawn(*SQUARE, *other, crease, ("F", 2, 4, 6, 0)))
     assert area_of(whole) == pytest.approx(20)
     assert "holes" not in [finding.code for finding in whole.told]
+    large = (("B", 2, 0, 62, 0), ("B", 62, 0, 62, 60), ("B", 62, 60, 2, 60), ("B", 2, 60, 2, 2))
+    found = pattern_from_lines(drawn(*SQUARE, *large, crease))
+    (said,) = [finding.sentence for finding in found.told if finding.code == "holes"]
+    assert "holds no paper, 99.9 % of its area; draw" in said
