@@ -41,7 +41,7 @@ PROBE = b"$I\n"
 FEED_HOLD = b"!"
 
 _WRITES_EEPROM = re.compile(
-    rb"^\$(?:\d+|N\d|RST|I)=|G0*10(?![\d.])|G0*28\.10*(?!\d)|G0*30\.10*(?!\d)", re.IGNORECASE
+    rb"^\$(?:N?[-+.\d]+|RST|I)=|G0*10(?![\d.])|G0*28\.10*(?!\d)|G0*30\.10*(?!\d)", re.IGNORECASE
 )
 _DWELL = re.compile(rb"G0*4(?![\d.])", re.IGNORECASE)
 _DWELL_SECONDS = re.compile(rf"P\+?({DECIMAL})".encode(), re.IGNORECASE)

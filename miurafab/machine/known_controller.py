@@ -28,7 +28,7 @@ from miurafab.profiles.machine import WAIT_S
 
 BUILD, SETTINGS, OFFSETS, MODES, STARTUP = "$I", "$$", "$#", "$G", "$N"
 _QUESTIONS = (BUILD, SETTINGS, OFFSETS, MODES, STARTUP)
-_WRITES_SETTING = re.compile(r"\$\s*(?:\d+|N\d|RST|I)\s*=", re.IGNORECASE)
+_WRITES_SETTING = re.compile(r"\$\s*(?:N?[-+.\d]+|RST|I)\s*=", re.IGNORECASE)
 _ANSWERS_IN = ("Idle", "Alarm")
 """The states in which GRBL answers its questions; ``error:8`` in the others (``system.c``)."""
 _REPORTS = 20

@@ -5,7 +5,8 @@ not. With it, ``M3`` keeps the beam on at rest in ``G1``, ``G2`` and ``G3``, and
 (gnea/grbl 1.1, ``gcode.c``, ``spindle_control.c``). So after each such line the beam burns one spot
 until somebody ends that. Some want it, to focus; nobody wants it by mistake.
 
-A startup block (``$N0=``) runs when it is stored, and after each reset (``system.c``).
+A startup block (``$N0=``) runs when it is stored, and after each reset, in the order of the blocks
+(``system.c``), which then add up. GRBL reads its number as any other: ``$N00=`` is the same.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from miurafab.machine.known_controller import KnownController
 
 _LASER_MODE = 32
 _BURNING = (1.0, 2.0, 3.0)
-_STARTUP = re.compile(r"\$N\d=(.*)")
+_STARTUP = re.compile(r"\$N[-+]?(\d*)\.?\d*=(.*)")
 
 
 def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> float:
@@ -68,13 +69,14 @@ class RestingBeam:
         if block is None and read.startswith("$"):
             return line
         if line != held:
-            self._refuse(line, read if block is None else block[1], starts=block is not None)
+            number, text = (None, read) if block is None else block.groups()
+            self._refuse(line, text, number)
         self._since.append(read)  # a startup block was run before it is answered
         return line
 
-    def _refuse(self, line: str, text: str, *, starts: bool) -> None:
-        """Hold ``line`` back if its ``text`` would light the resting beam; ``starts``: after each
-        reset, too.
+    def _refuse(self, line: str, text: str, number: str | None) -> None:
+        """Hold ``line`` back if its ``text`` would light the resting beam, or, as the startup block
+        of ``number`` among the others, each start would.
         """
         state = self._known.state
         if state.modes:
@@ -85,13 +87,18 @@ class RestingBeam:
         ]
         now = 0.0 if state.beam_off else resting_power(before, laser_mode=laser_mode)
         power = resting_power([*before, *_words(text)], laser_mode=laser_mode)
-        later = resting_power(_words(text), laser_mode=laser_mode) if starts else 0.0
+        later = 0.0
+        if number is not None:
+            blocks = {**self._known.modes.startup, int(number or 0): text}
+            start = [word for _, block in sorted(blocks.items()) for word in _words(block)]
+            later = resting_power(start, laser_mode=laser_mode)
         if power <= now and later == 0.0:
             return
         self._held = line
-        end = "M5, and again after each reset" if starts else "M5 or a reset"
+        then, power = ("", power) if power > now else (" and the next reset", later)
+        end = "M5, and again after each reset" if later else "M5 or a reset"
         raise GcodeError(
-            f"After {line} the beam would be on, with S{power:g}, while the head rests "
+            f"After {line}{then} the beam would be on, with S{power:g}, while the head rests "
             f"(${_LASER_MODE}={laser_mode:d}): it burns one spot until {end}. Send the same line "
             "again if you want that."
         )

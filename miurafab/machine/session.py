@@ -28,6 +28,8 @@ from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
 from miurafab.profiles.machine import WAIT_S
 
+HOME = "$H"
+"""Homing, after which the controller knows its place again."""
 HOMING_S = 180.0
 """The longest time of homing; GRBL answers nothing meanwhile, not even a status query."""
 _RESETS = 3
@@ -226,6 +228,8 @@ class Session:
         said, refusal = self._exchange(text, timeout)
         if refusal is not None:
             raise ControllerError(f"The controller refused '{text}': {error_words(refusal)}.")
+        if text.upper() == HOME:
+            self.restarted_itself = False
         return said
 
     def ask(self, text: str) -> list[Event]:
@@ -272,10 +276,9 @@ class Session:
 
         self._check = both
         try:
-            self.command("$H", HOMING_S)
+            self.command(HOME, HOMING_S)
         finally:
             self._check = check
-        self.restarted_itself = False
         self.wait_status()
 
     def _require_ready(self, text: str) -> None:

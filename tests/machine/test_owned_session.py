@@ -416,20 +416,21 @@ def test_a_session_is_opened_with_a_reset_where_one_is_asked_for() -> None:
     assert wire.commands.startswith(b"\x18")
 
 
-def test_homing_greets_the_machine_and_tells_where_it_stands_after_a_restart() -> None:
+@pytest.mark.parametrize("way", [MachineSession.home, lambda session: session.say("$h")])
+def test_homing_tells_where_the_machine_stands_after_a_restart(
+    way: Callable[[MachineSession], object],
+) -> None:
+    """A stored offset outlives the restart, so that nothing but the homing is said after it."""
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE) | HOMING, baud=115_200))
     session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
     assert sent_by(wire, session.home).startswith(b"$I\n$$\n")
-    session.jog(x=-300.0, y=-300.0)
-    session.set_origin()
+    session.say("G10 L2 P1 X-300 Y-300")
     wire.device.power_cycle()
     assert session.watch(1.0).state == "Alarm"
     session.unlock()
     with pytest.raises(ControllerError, match="restarted by itself since the last job"):
         session.cut(JOB)
-    session.home()
-    session.jog(x=-300.0, y=-300.0)
-    session.set_origin()
+    way(session)
     assert session.cut(JOB).lines == 15
 
 

@@ -80,10 +80,16 @@ def test_what_is_no_program_is_sent_whatever_is_armed(line: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["m3 s500", "M3 s500", "/M3 S500", "$n0=m3 s500", "$N0=m3S500", "$ n 0 = M3 / S500"]
+    "line",
+    [
+        *("m3 s500", "M3 s500", "/M3 S500", "$n0=m3 s500", "$N0=m3S500", "$ n 0 = M3 / S500"),
+        *("$N00=M3S500", "$N0.0=M3S500", "$N+1.7=M3S500", "$N.5=M3S500"),
+    ],
 )
 def test_a_line_is_held_back_as_the_firmware_reads_it(line: str) -> None:
-    """In capitals, without blanks and the sign of block delete (gnea/grbl 1.1, ``protocol.c``)."""
+    """In capitals, without blanks and the sign of block delete (gnea/grbl 1.1, ``protocol.c``), the
+    number of a startup block as any other (``system.c``).
+    """
     session, wire = here(laser_mode=False)
     assert not is_sent(session, wire, line)
     assert not wire.device.beam_on
@@ -100,6 +106,40 @@ def test_a_startup_block_that_lights_each_start_is_held_back_under_a_burning_bea
     assert is_sent(session, wire, "M3 S500")
     assert not is_sent(session, wire, "$N0=M3S500")
     assert session.abort()
+    assert not wire.device.beam_on
+
+
+@pytest.mark.parametrize(
+    ("laser_mode", "lines", "last"),
+    [
+        (False, ["$N0=M3", "M5"], "$N1=S500"),
+        (False, ["$N1=S500", "S0"], "$N0=M3"),
+        (True, ["$N0=G1F100", "G0"], "$N1=M3S500"),
+    ],
+)
+def test_startup_blocks_that_light_each_start_together_are_held_back(
+    laser_mode: bool, lines: list[str], last: str
+) -> None:
+    session, wire = here(laser_mode)
+    assert all(is_sent(session, wire, line) for line in lines)
+    with pytest.raises(GcodeError, match=r" and the next reset .*S500.*M5, and again after each"):
+        session.say(last)
+    assert is_sent(session, wire, last)
+    assert not wire.device.beam_on
+    wire.device.power_cycle()
+    wire.device.advance(2.0)
+    assert wire.device.beam_on
+
+
+@pytest.mark.parametrize("line", ["$N0=", "$N1=M5", "$N1=S0", "$N0=G21"])
+def test_a_startup_block_that_ends_what_each_start_lights_is_sent(line: str) -> None:
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "$N0=M3S500")
+    assert is_sent(session, wire, "$N0=M3S500")
+    session.abort()
+    assert is_sent(session, wire, line)
+    wire.device.power_cycle()
+    wire.device.advance(2.0)
     assert not wire.device.beam_on
 
 
