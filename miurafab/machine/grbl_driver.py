@@ -279,5 +279,5 @@ class GrblDriver(StreamDriver):
 
 
 def _rests(report: StatusReport | None) -> bool:
-    """Whether a hold has come to its end."""
-    return report is not None and report.state == "Hold" and report.substate == 0
+    """Whether a hold has come to its end, as far as the controller tells (GRBL 0.9 does not)."""
+    return report is not None and report.state == "Hold" and not report.substate

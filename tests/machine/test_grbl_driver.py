@@ -13,6 +13,7 @@ from wires import FakeWire
 
 from miurafab.errors import ControllerError, JobStopped, PersonNeeded
 from miurafab.gcode.job import Job
+from miurafab.machine.dialects import virtual_machine
 from miurafab.machine.known_controller import PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.planning import SendOptions, plan_job
@@ -252,6 +253,25 @@ def test_a_pause_is_known_whatever_of_the_place_is_reported(place: bytes) -> Non
     job = Job("paused.nc", "M4 S0\nG1 X20 S500 F3000\nM0\nG4 P0.1\nM5\n")
     deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
     assert wire.commands.count(b"~") == 1
+
+
+@pytest.mark.parametrize("at_pause", ["go on", "stop"])
+def test_a_pause_is_known_to_a_controller_that_does_not_tell_how_it_holds(at_pause: str) -> None:
+    """GRBL 0.9 says Hold from the first braking on, and the head stands where the pause is."""
+    old = load_machine("grbl09-laser-300")
+    options = SendOptions(allow_m3=True)
+    job = Job("paused.nc", "G0 X5 Y5\nM3 S0\nG1 X20 S500 F300\nM5\nM0\nG0 X30\n")
+    plan = replace(plan_job(job, old, options), at_pause=at_pause)
+    wire = FakeWire(virtual_machine(old))
+    within_a_minute(wire)
+    if at_pause == "stop":
+        with pytest.raises(PersonNeeded, match=r"line 5 waits for a person \(M0\)"):
+            deliver(plan, wire, StopSignals())
+    else:
+        pressed_at_the_machine(wire, (2.0, b"!"), (9.0, b"~"))
+        assert deliver(plan, wire, StopSignals()).seconds > 9
+        assert wire.commands.count(b"~") == 1
+    assert burnt(wire) == pytest.approx(15, abs=0.2)
 
 
 def test_a_pause_before_any_move_is_one() -> None:
