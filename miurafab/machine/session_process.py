@@ -287,6 +287,8 @@ def main() -> None:
         signal.signal(signal.SIGTSTP, signal.SIG_IGN)  # Ctrl-Z is for the starting program
 
     def tell(message: Message) -> None:
+        if parent.suspended and isinstance(message, MachineState | Progress):
+            return  # nobody reads them, and a full pipe would hold this process up
         data = pickle.dumps(message, protocol=5)  # whole, so that a signal cannot tear it
         with contextlib.suppress(OSError):  # nobody listens any more
             up.write(data)

@@ -52,7 +52,8 @@ _SIGNALS = {code[0]: name for name, code in STOPS.items()}
 class ParentWatch:
     """``with ParentWatch(...)``: watch the starting program until the end of the block.
 
-    ``resets`` is the number of keys that reset at once, up to now.
+    ``resets`` is the number of keys that reset at once, up to now. ``suspended``: a person has
+    suspended the starting program, which reads nothing meanwhile.
     ``descriptor`` is the pipe's end to read; ``signals`` are told why, when it is gone. It is also
     the job's keyboard (:class:`~miurafab.machine.keys.Keys`): printable bytes are keys.
     """
@@ -62,7 +63,7 @@ class ParentWatch:
         self._signals = signals
         self._silence = silence
         self._heard = time.monotonic()
-        self._patient = False
+        self.suspended = False
         self._over = threading.Event()
         self.resets = 0
         self._keys: list[str] = []
@@ -118,7 +119,7 @@ class ParentWatch:
         if name is not None:
             self._stop(name)
         elif coming[:1] in (BEAT, SUSPENDED):
-            self._patient = coming[:1] == SUSPENDED
+            self.suspended = coming[:1] == SUSPENDED
         else:
             self.resets += coming[:1] == RESET
             self._keys.append(chr(coming[0]))
@@ -126,7 +127,7 @@ class ParentWatch:
 
     def _guard(self) -> None:
         while not self._over.wait(self._silence / 20):
-            if not self._patient and time.monotonic() - self._heard > self._silence:
+            if not self.suspended and time.monotonic() - self._heard > self._silence:
                 self._lost("the silence of the program that started it")
                 return
 

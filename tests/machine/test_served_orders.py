@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import pickle
 import signal
 import socket
+import subprocess
 import sys
 from collections import deque
+from pathlib import Path
 
 import pytest
 from session_walk import JOB, MACHINE
 
 from miurafab.errors import InputError, JobStopped, MachineError, PortError, ProfileError
+from miurafab.gcode.job import Job
 from miurafab.machine import job_process, session_process, virtual_server
+from miurafab.machine.journal import read_journal
 from miurafab.machine.known_controller import KnownController, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.modes import ControllerModes
 from miurafab.machine.owner import Owner, claim
+from miurafab.machine.planning import plan_job
 from miurafab.machine.session_process import (
     Outcome,
     SessionOrder,
@@ -134,6 +140,24 @@ def test_a_suspended_program_holds_what_burns_or_stops_it(
     assert [each for each in told if each in (what, SUSPENDED, "suspended")] == [
         *(what, SUSPENDED, "suspended")
     ]
+
+
+def test_a_program_that_is_suspended_holds_the_process_up_in_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It reads nothing, and what tells the progress would soon wait for it in a full pipe."""
+    monkeypatch.setattr(SessionProcess, "_read", lambda self, pipe: None)
+    process, journal = SessionProcess(MACHINE, "virtual", StopSignals()), tmp_path / "journal"
+    process._tell(SUSPENDED)
+    slow = plan_job(Job("slow.nc", "M4 S0\nG1 X30 S500 F30\nM5\n"), MACHINE)
+    process.order("cut", plan=slow, journal_path=journal)
+    process.order("close")
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process._process.wait(60)
+    process.end()
+    assert process.death.startswith("ended with code 0")
+    (run,) = read_journal(journal)
+    assert (run.ended, run.taken) == ("done", 3)
 
 
 class Ended:
