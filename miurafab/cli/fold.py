@@ -79,7 +79,8 @@ def fold(
             raise InputError(f"{panels} needs a `thickness` of the panels, such as 3mm.")
     if "method" in given and asked.thickness_mm is None:
         raise OptionError("method", "is for panels; add a `thickness` such as 3mm")
-    pattern = miurafab.load(file)
+    # panels are of the same reading of the file
+    pattern = file if asked.thickness_mm is None else miurafab.load(file)
     from miurafab.workflow.panels import thickness_report
 
     with console.progress("folding") as progress:

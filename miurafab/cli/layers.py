@@ -46,7 +46,7 @@ def layers(
     """
     if out is not None:
         new_file(out, "The pattern folded flat", (".fold",))
-    found = miurafab.layers(miurafab.load(file), **given)
+    found = miurafab.layers(file, **given)
     answer: dict[str, Any] = found.report()
     if out is not None and found.exists:
         found.save(out, title=file.stem)

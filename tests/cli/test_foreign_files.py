@@ -200,3 +200,18 @@ def test_a_vertex_of_no_facet_is_left_out_and_told(run, tmp_path) -> None:
     assert (answer["vertices"], answer["edges"]) == (4, {"B": 4, "V": 1})
     assert codes(answer) == ["lost-lines"]
     assert "2 vertices of no facet, with 1 edge" in answer["findings"][0]["sentence"]
+
+
+def test_each_command_names_the_file_that_does_not_hold(run, tmp_path) -> None:
+    """`fold` and `layers` said "The pattern"."""
+    path = written(
+        tmp_path,
+        vertices_coords=SQUARE,
+        edges_vertices=[*BORDER, [0, 2]],
+        edges_assignment=list("BBBFV"),
+        faces_vertices=[[0, 1, 2], [0, 2, 3]],
+    )
+    for words in (("layers",), ("fold",), ("energy",), ("convert", tmp_path / "a.svg")):
+        done = run(words[0], path, *words[1:])
+        assert done.returncode == 2
+        assert f"{path} does not hold, and nothing is made of it: Edge 3 is F" in done.stderr
