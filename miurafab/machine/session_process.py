@@ -124,7 +124,8 @@ class SessionProcess:
         self._beat_at = 0.0
         self._give_up_at: float | None = None
         self._burns = 0
-        self._wishes = 0 if signals.suspension is None else signals.suspension.wishes
+        wished = signals.suspension
+        self._wishes = 0 if wished is None else wished.wishes - wished.pending
         self._process = subprocess.Popen(
             python_command(__name__),
             stdin=subprocess.PIPE,
@@ -144,8 +145,8 @@ class SessionProcess:
         for reader in self._readers:
             reader.start()
         self._send(PortOpening(machine, port, virtual_speed, this_owner(), tuple(sys.argv)))
-        if signals.suspension is not None:
-            signals.suspension.sessions.add(self)
+        if wished is not None:
+            wished.sessions.add(self)
 
     def _read(self, pipe: IO[bytes]) -> None:
         with contextlib.suppress(EOFError, pickle.UnpicklingError):
@@ -199,10 +200,10 @@ class SessionProcess:
             self._tell(STOPS[self._signals.caught])
         elif self._give_up_at is not None and now > self._give_up_at:
             self._process.kill()
-        if now >= self._beat_at:
+        wished = self._signals.suspension
+        if now >= self._beat_at and not (wished is not None and wished.pending):
             self._tell(BEAT)
             self._beat_at = now + BEAT_S
-        wished = self._signals.suspension
         if wished is not None and wished.wishes != self._wishes:
             self._wishes = wished.wishes
             self._be_suspended(wished)
@@ -236,7 +237,7 @@ class SessionProcess:
     def end(self) -> None:
         """Close the pipe, on every way out; that stops the machine if it still runs."""
         if self._signals.suspension is not None:
-            self._signals.suspension.sessions.discard(self)
+            self._signals.suspension.left(self)
         with contextlib.suppress(OSError):
             self._down.close()
         try:

@@ -29,11 +29,13 @@ _WORDS = {
 class Suspension:
     """A wish to suspend this program, which ``here`` fulfils when all ``sessions`` were told.
 
-    ``wishes`` counts them; each session compares it with what it has told.
+    ``wishes`` counts them; each session compares it with what it has told. ``pending``: not all
+    have told it yet, and those that have must keep silent.
     """
 
     def __init__(self, here: Callable[[], None]) -> None:
         self.wishes = 0
+        self.pending = False
         self.sessions: set[object] = set()
         self._here = here
         self._told: set[object] = set()
@@ -41,6 +43,7 @@ class Suspension:
     def wish(self) -> None:
         """The person at the terminal wants it."""
         self.wishes += 1
+        self.pending = True
         self._told.clear()
         self._suspend_if_told()
 
@@ -49,9 +52,15 @@ class Suspension:
         self._told.add(session)
         self._suspend_if_told()
 
+    def left(self, session: object) -> None:
+        """``session`` has ended: nobody waits for it any more."""
+        self.sessions.discard(session)
+        self._suspend_if_told()
+
     def _suspend_if_told(self) -> None:
-        if self._told >= self.sessions:
+        if self.pending and self._told >= self.sessions:
             self._here()
+            self.pending = False
 
 
 class StopSignals:

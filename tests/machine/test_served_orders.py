@@ -35,7 +35,7 @@ from miurafab.machine.session_process import (
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import SerialTransport, VirtualTransport
 from miurafab.machine.virtual_server import TcpWire, load_controller, serve_virtual
-from miurafab.machine.watchdog import STOPS, SUSPENDED, GivenOrder, ParentWatch
+from miurafab.machine.watchdog import BEAT, STOPS, SUSPENDED, GivenOrder, ParentWatch
 from miurafab.profiles import load_machine
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
@@ -140,6 +140,31 @@ def test_a_suspended_program_holds_what_burns_or_stops_it(
     assert [each for each in told if each in (what, SUSPENDED, "suspended")] == [
         *(what, SUSPENDED, "suspended")
     ]
+
+
+@pytest.mark.parametrize("last", ["told", "ended", "begun"])
+def test_a_program_with_several_machines_is_silent_at_all_until_it_is_suspended(
+    deaf: None, monkeypatch: pytest.MonkeyPatch, last: str
+) -> None:
+    """A beat after the wish was told would say that it is back: five seconds later it is hung."""
+    signals, told = suspending_signals(), []
+    monkeypatch.setattr(signals.suspension, "_here", lambda: told.append("suspended"))
+    one, other = (SessionProcess(MACHINE, "virtual", signals) for _ in range(2))
+    monkeypatch.setattr(one, "_tell", told.append)
+    signals.suspension.wish()
+    for _ in range(4):
+        one.poll()
+    assert told == [SUSPENDED]
+    third = SessionProcess(MACHINE, "virtual", signals) if last == "begun" else other
+    for each in {other, third} if last != "ended" else ():
+        assert told == [SUSPENDED]
+        each.poll()
+    other.end()
+    assert told == [SUSPENDED, "suspended"]
+    third.end()
+    one.poll()
+    assert told == [SUSPENDED, "suspended", BEAT]
+    one.end()
 
 
 def test_a_program_that_is_suspended_holds_the_process_up_in_nothing(
