@@ -189,3 +189,29 @@ def test_vertices_that_only_flat_edges_have_make_no_sheet_large(
     first = min(waiting_folds(pattern))
     assert first != min(waiting_folds(cross("VVVM")))
     assert f"the first being edge {first}." in str(told.value)
+
+
+def ring(digits: int, aside: float = 0.0) -> CreasePattern:
+    """A polygon with a crease out from each corner, away from one point; of the first of these the
+    end lies ``aside``.
+
+    Around all corners the turns add up to none if each side turns by the inverse of its distance
+    from that point.
+    """
+    turns = np.cumsum([0.3, 0.8, 1.0, 0.7, 0.9, 1.1, 0.8])
+    out = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    corners = out * np.array([1.0, 1.2, 0.9, 1.1, 1.3, 1.0, 1.15])[:, None]
+    tips = 3 * out
+    tips[0] += aside * np.array([-out[0, 1], out[0, 0]])
+    places = [tuple(place) for place in np.round(np.concatenate([corners, tips]), digits).tolist()]
+    near, far = places[:7], places[7:]
+    lines = named_patterns.border(*far)
+    for n in range(7):
+        lines += [(near[n], near[(n + 1) % 7], "V", 90.0), (near[n], far[n], "V", 90.0)]
+    return named_patterns.drawn(lines)
+
+
+@pytest.mark.parametrize("digits", [16, 6])
+def test_folds_of_a_rounded_drawing_begin_as_those_of_the_exact_one(digits: int) -> None:
+    assert len(waiting_folds(ring(digits))) == 0
+    assert len(waiting_folds(ring(digits, aside=0.01))) == 14
