@@ -90,7 +90,7 @@ class RestingBeam:
         later = 0.0
         if number is not None:
             blocks = {**self._known.modes.startup, int(number or 0): text}
-            start = [word for _, block in sorted(blocks.items()) for word in _words(block)]
+            start = [word for block in blocks.values() for word in _words(block)]
             later = resting_power(start, laser_mode=laser_mode)
         if power <= now and later == 0.0:
             return

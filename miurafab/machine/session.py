@@ -66,7 +66,6 @@ class Session:
         self.overrides = AS_WRITTEN
         self.overrides_told = False
         self.mm_per_unit = 1.0
-        self.heard = 0.0
         self.starts = 0
         self.restarted_itself = False
         self._resetting = False
@@ -133,9 +132,8 @@ class Session:
         data = self._transport.read(min(max(0.0, timeout), self.patience))
         if not data:
             return []
-        self.heard = self.now()
         if self.transcript is not None:
-            self.transcript.came(self.heard, data)
+            self.transcript.came(self.now(), data)
         self.on_data(data)
         self.connection.receive_data(data)
         events = list(self.connection.events())

@@ -143,6 +143,14 @@ def test_a_startup_block_that_ends_what_each_start_lights_is_sent(line: str) -> 
     assert not wire.device.beam_on
 
 
+@pytest.mark.parametrize("number", ["0", "00.9", ".5"])
+def test_a_startup_block_that_another_ends_is_ended_by_a_reset(number: str) -> None:
+    session, _ = here(laser_mode=False)
+    session.say("$N1=M5")
+    with pytest.raises(GcodeError, match=r"=M3S500 the beam would be on, .* until M5 or a reset\."):
+        session.say(f"$N{number}=M3S500")
+
+
 def test_a_startup_block_has_run_when_it_is_answered() -> None:
     """Its modes are told by then, as the storing waits for its motion."""
     session, wire = here(laser_mode=True)
