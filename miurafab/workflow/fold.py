@@ -284,7 +284,7 @@ def fold(
     OptionError
         For ``steps`` or a ``timeout`` out of range.
     InputError
-        If the ``timeout`` passes before the motion is found.
+        If the ``timeout`` passes before the motion and its contacts are found.
 
     Examples
     --------
@@ -310,7 +310,7 @@ def _until(timeout: float | None, on_progress: Progress | None) -> Progress | No
     def told(part: float, text: str) -> None:
         if time.monotonic() > end:
             raise InputError(
-                f"No motion was found within the {timeout:g} s of `timeout`: the search was at "
+                f"The motion was not ready within the {timeout:g} s of `timeout`: it was at "
                 f"{text}. Give it more time, or ask for fewer `steps`."
             )
         if on_progress is not None:

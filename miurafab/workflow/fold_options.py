@@ -33,7 +33,7 @@ class FoldOptions:
     )
     timeout: float | None = option(
         number(0, above=True),
-        "Give up after so many seconds, if no motion is found up to then.",
+        "Give up after so many seconds, if the motion is not ready by then.",
         default_text="none",
     )
     method: str = option(

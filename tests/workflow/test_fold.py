@@ -68,6 +68,9 @@ def test_a_motion_that_takes_longer_than_its_timeout_is_given_up(
     with pytest.raises(InputError, match="'timeout'"):
         fold(pattern, 4, timeout=-1.0)
     assert len(fold(pattern, 4, timeout=999.0).motion.frames) == 5
+    late = r"^The motion was not ready within the 2 s of 'timeout': it was at self-contact\."
+    with pytest.raises(InputError, match=late):  # by its closed form it is there at once
+        fold(regular(), 4, timeout=2.0)
 
 
 def test_frames_of_a_wish_are_named_by_their_part_of_it(tmp_path: Path) -> None:
