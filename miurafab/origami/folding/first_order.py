@@ -35,9 +35,9 @@ from miurafab.origami.invariants import interior_vertices
 
 MOST_BENT = 5000
 """Vertices of a sheet whose facets may have to bend from the start; finding how takes minutes."""
-BEHIND, BESIDE = 1e-9, 1e-5
-"""n.s_e d_e of what counts as on the line of a vertex, and as beside it: a fold that turns some ten
-thousand times slower than the others rests."""
+BESIDE = 1e-5
+"""n.s_e d_e of what counts as on the line of a vertex, to either side of it, for the rounding of a
+drawing: a fold that turns some ten thousand times slower than the others rests."""
 SLACK = 1e-5
 """What may be left of the sum around a vertex, where one fold turns by 1: drawings are rounded, and
 without it the program finds no answer for some of them."""
@@ -160,7 +160,7 @@ def _rests_at_vertices(ends: _Ends) -> Bools:
         middle = angle[place] + gap[place] / 2
         across = -np.stack([np.cos(middle), np.sin(middle)], axis=1)
         height = np.einsum("nk,nk->n", signed, np.repeat(across, last - first + 1, axis=0))
-        one_side = np.minimum.reduceat(height, first) >= -BEHIND
+        one_side = np.minimum.reduceat(height, first) >= -BESIDE
         still = np.repeat(one_side, last - first + 1) & (height > BESIDE)
         if not still.any():
             break

@@ -26,16 +26,19 @@ def test_all_folds_of_a_known_pattern_begin_together(name: str) -> None:
     assert not len(waiting_folds(getattr(named_patterns, name)()))
 
 
-def folded_map(letters: str) -> CreasePattern:
+def folded_map(letters: str, turn: complex = 1.0, digits: int = 16) -> CreasePattern:
     """A map of 3 x 3: lines across by lines up, the second line folded after the first."""
-    lines = named_patterns.border((0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0))
+
+    def place(x: float, y: float) -> tuple[float, float]:
+        turned = turn * complex(x, y)
+        return round(turned.real, digits), round(turned.imag, digits)
+
+    lines = named_patterns.border(place(0, 0), place(3, 0), place(3, 3), place(0, 3))
     marks = iter(letters)
-    for k in (1.0, 2.0):
-        for at in range(3):
-            lines.append(((k, float(at)), (k, at + 1.0), next(marks), 180.0))
-    for k in (1.0, 2.0):
-        for at in range(3):
-            lines.append(((float(at), k), (at + 1.0, k), next(marks), 180.0))
+    for k in (1, 2):
+        lines += [(place(k, at), place(k, at + 1), next(marks), 180.0) for at in range(3)]
+    for k in (1, 2):
+        lines += [(place(at, k), place(at + 1, k), next(marks), 180.0) for at in range(3)]
     return named_patterns.drawn(lines)
 
 
@@ -215,3 +218,11 @@ def ring(digits: int, aside: float = 0.0) -> CreasePattern:
 def test_folds_of_a_rounded_drawing_begin_as_those_of_the_exact_one(digits: int) -> None:
     assert len(waiting_folds(ring(digits))) == 0
     assert len(waiting_folds(ring(digits, aside=0.01))) == 14
+
+
+@pytest.mark.parametrize("degrees", range(5, 90, 10))
+@pytest.mark.parametrize("digits", [6, 7])
+def test_a_line_that_rounding_bends_to_either_side_is_straight(degrees: int, digits: int) -> None:
+    """Where it bent away from the folds across it, they had their balance, ever so slowly."""
+    turn = complex(math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))
+    assert len(waiting_folds(folded_map("VVVVVVVMVVMV", turn, digits))) == 6
