@@ -39,7 +39,13 @@ from miurafab.origami.folding.kinematics import (
     rigid_motion,
     states_between,
 )
-from miurafab.origami.folding.ramp_motion import MOST_WRONG, RampVerdict, followed_once, ramp_motion
+from miurafab.origami.folding.ramp_motion import (
+    MOST_WRONG,
+    AstrayError,
+    RampVerdict,
+    followed_once,
+    ramp_motion,
+)
 
 Progress = Callable[[float, str], None]
 
@@ -85,7 +91,10 @@ def find_motion(
     lean = without_flat_edges(pattern)
     if pattern.folded_coords is None:
         refuse_locked(lean.pattern, lean.edges)
-    found = _find(lean.pattern, steps, on_progress)
+    try:
+        found = _find(lean.pattern, steps, on_progress)
+    except AstrayError as astray:
+        raise astray.among(lean.edges) from None
     verdict = found.verdict
     if verdict is not None:
         verdict = replace(
@@ -235,17 +244,19 @@ def _sequence(verdict: RampVerdict) -> PatternError:
     if len(wrong):
         how = (
             f"{verdict.wrong_signs:.0%} of its folds end on the other side than their letter "
-            f"tells, the first being edge {wrong[0]}"
+            "tells, the first being edge {wrong}"
         )
     begin = "All of them could begin together"
     if len(waiting):
         begin = (
             f"With flat facets {len(waiting)} of its {verdict.folds} folds cannot begin from flat "
-            f"if none shall turn to its wrong side, the first being edge {waiting[0]}"
+            "if none shall turn to its wrong side, the first being edge {waiting}"
         )
-    return PatternError(
+    first = {"wrong": wrong, "waiting": waiting}
+    return AstrayError(
         f"The pattern does not fold in one motion: with all creases turning together, {how}. "
         f"{begin}. Either letters are wrong, or its facets have to bend from the start, as in some "
         "twists, or it folds in a sequence, crease after crease, like a crane; fold its steps as "
-        "patterns of their own." + followed_once(verdict)
+        "patterns of their own." + followed_once(verdict),
+        **{name: int(edges[0]) for name, edges in first.items() if len(edges)},
     )

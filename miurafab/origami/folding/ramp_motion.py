@@ -72,6 +72,18 @@ class RampVerdict:
         return False
 
 
+class AstrayError(PatternError):
+    """Folds that do not go with the others; ``told`` has the names of some ``edges`` in braces."""
+
+    def __init__(self, told: str, **edges: int) -> None:
+        super().__init__(told.format(**edges))
+        self.told, self.edges = told, edges
+
+    def among(self, edges: Ints) -> PatternError:
+        """The error for a pattern of which this one has the ``edges``."""
+        return PatternError(self.told.format(**{k: edges[e] for k, e in self.edges.items()}))
+
+
 def followed_once(verdict: RampVerdict) -> str:
     """The sentence on a sheet that was followed once; empty for another."""
     if verdict.followed_again is None:
@@ -206,10 +218,11 @@ def _stuck(paths: list[RampPath], waiting: Ints) -> PatternError:
             "a larger `tolerance`, which joins lines that nearly meet."
         )
     folds = sum(len(path.sprung) for path in paths)
-    return PatternError(
+    return AstrayError(
         f"The pattern could not be brought out of the plane: with flat facets {len(waiting)} of "
         f"its {folds} folds cannot begin from flat if none shall turn to its wrong side, the first "
-        f"being edge {waiting[0]}. Either letters are wrong, or its facets have to bend from "
+        "being edge {waiting}. Either letters are wrong, or its facets have to bend from "
         "the start, as in some twists, or it folds in a sequence, crease after crease, which one "
-        "motion of all creases cannot show."
+        "motion of all creases cannot show.",
+        waiting=int(waiting[0]),
     )

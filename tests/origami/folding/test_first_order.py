@@ -192,6 +192,13 @@ def test_vertices_that_only_flat_edges_have_make_no_sheet_large(
     first = min(waiting_folds(pattern))
     assert first != min(waiting_folds(cross("VVVM")))
     assert f"the first being edge {first}." in str(told.value)
+    monkeypatch.setattr(first_order, "MOST_BENT", 9)
+    monkeypatch.setattr(motion, "MOST_WRONG", -1.0)  # as for folds that go astray on the way
+    with pytest.raises(PatternError, match="does not fold in one motion") as told:
+        find_motion(pattern, 4)
+    waits = "2 of its 4 folds cannot begin from flat if none shall turn to its wrong side"
+    assert f"{waits}, the first being edge {first}." in str(told.value)
+    assert type(told.value) is PatternError
 
 
 def ring(digits: int, aside: float = 0.0) -> CreasePattern:
