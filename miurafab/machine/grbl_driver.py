@@ -146,9 +146,9 @@ class GrblDriver(StreamDriver):
             waited = session.now() - begin
             self._listened += waited
             silent = 0.0 if events else silent + waited
+            self._watch_for_loss(events)
             for event in events:
                 streamer.take(event)
-                self._watch_for_loss(event)
                 if isinstance(event, StatusReport):
                     self._resume_a_late_hold(event)
                     self.tell(
@@ -242,12 +242,16 @@ class GrblDriver(StreamDriver):
             return (_WAS_ARMED,)
         return ()
 
-    def _watch_for_loss(self, event: Event) -> None:
-        """Raise if the controller idles while an answer is missing: the line was damaged."""
+    def _watch_for_loss(self, events: list[Event]) -> None:
+        """Raise if the controller idles while an answer is missing: the line was damaged. What is
+        owed is so after all of the ``events``, among which the answer may follow the report.
+        """
         owed = self._session.connection.in_flight
-        if not (isinstance(event, StatusReport) and event.state in _DONE and owed):
-            if isinstance(event, Ok | Error | StatusReport):
-                self._idle_at = None
+        reports = [event for event in events if isinstance(event, StatusReport)]
+        busy = any(report.state not in _DONE for report in reports)
+        if busy or not owed or any(isinstance(event, Ok | Error) for event in events):
+            self._idle_at = None
+        if not owed or not reports or reports[-1].state not in _DONE:
             return
         if self._idle_at is None:
             self._idle_at = self._listened

@@ -73,6 +73,27 @@ def test_who_dawdles_until_a_dwell_begins_loses_no_answer() -> None:
     assert b"\x18" not in wire.commands
 
 
+@pytest.mark.parametrize("seconds", [4.0, 4.1, 4.2, 4.3])
+def test_an_answer_that_comes_with_a_report_of_the_dwell_is_no_loss(seconds: float) -> None:
+    """As over a network: the report was made before the answer, and both are read at once."""
+
+    class Coarse(FakeWire):
+        kept, due = b"", 0.0
+
+        def read(self, timeout: float) -> bytes:
+            self.kept += super().read(timeout)
+            if self.now() < self.due:
+                return b""
+            said, self.kept, self.due = self.kept, b"", self.now() + 0.5
+            return said
+
+    wire = Coarse(new_wire().device)
+    moves = "".join(f"G1 X{20 + n % 2}\n" for n in range(9))
+    job = Job("dwell.nc", f"M4 S0\nG1 X20 S500 F3000\nG4 P{seconds}\n{moves}M5\n")
+    assert deliver(plan_job(job, MACHINE), wire, StopSignals()).lines == 13
+    assert b"\x18" not in wire.commands
+
+
 def test_who_dawdles_hears_no_silence_of_a_slow_line() -> None:
     wire = new_wire(latency=0.5)
     job = Job("slow.nc", "M4 S0\nG1 X20 S500 F60\nM5\n")
