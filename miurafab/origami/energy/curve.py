@@ -2,9 +2,8 @@
 
 The torque on the driven crease is the slope of the energy, dE/d rho. Its zeros are the stable
 states and the barriers; regula falsi finds them between the steps of the path
-(:mod:`miurafab.origami.energy.path`). A step is halved where it is longer than a sixteenth of the
-path, and where the energies at its ends and the torques there do not fit together without a turn
-between them, as where the energy rises from the folded form and falls again in the first step.
+(:mod:`miurafab.origami.energy.path`). A path of few steps is followed in shorter ones, since in a
+long step the sheet may go over a barrier, or jump to another shape, unseen.
 
 The energy of a sheet that folds rigidly is zero along the path. The less flat-foldable a sheet is,
 the higher is the barrier that keeps its folded form (Dudte et al., Nature Materials 15 (2016)).
@@ -15,14 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
-from miurafab.origami.energy.continuation import LONGEST, Known, follow, without_load
-from miurafab.origami.energy.driven import Driven
+from miurafab.origami.energy.continuation import LONGEST, Known, without_load
 from miurafab.origami.energy.equilibrium import solve
 from miurafab.origami.energy.path import (
     NEARLY_FLAT,
@@ -40,12 +38,8 @@ if TYPE_CHECKING:
 
 NOISE = 1e-15
 """Energies up to this, in the model's unit, are rounding; the sheet then folds rigidly."""
-LONGEST_STEP = 1.0 / 16.0
-"""Of the whole path: the longest step between states at which the energy is looked at."""
-LEAST_ENERGY = 1e-9
-"""Of the largest energy: between states below it, turns are not looked for."""
-MOST_HALVINGS = 6
-"""How often a step is halved to find a turn of the energy in it."""
+FINE = 24
+"""The fewest steps in which a path is followed, however few of its shapes are asked for."""
 SMALL_TURN = 1e-3
 """Radians to either side of the folded form, for the difference quotient of its stiffness."""
 
@@ -172,10 +166,12 @@ def energy_curve(
 ) -> EnergyCurve:
     """The energy of ``pattern`` from its folded form to nearly flat, with barrier and stable
     states; arguments, errors and path as for
-    :func:`~miurafab.origami.energy.path.folding_path`.
+    :func:`~miurafab.origami.energy.path.folding_path`. Barrier and states are those of a path of
+    at least :data:`FINE` steps, of which the curve has every so manyth.
     """
     model = sheet_model(pattern) if model is None else model
-    traced = trace(model, crease, towards(NEARLY_FLAT, steps), on_progress)
+    finer = math.ceil(FINE / max(steps, 1))
+    traced = trace(model, crease, towards(NEARLY_FLAT, finer * steps), on_progress)
     path = path_of(traced)
     flat = np.column_stack([pattern.vertices_coords, np.zeros(len(pattern.vertices_coords))])
     flat_energy = model.energy(flat / model.unit_mm)
@@ -189,7 +185,7 @@ def energy_curve(
     folded = [] if rigid else [StableState(float(path.drives[0]), at_rest)]
     top = max(maxima, key=lambda state: state.energy, default=None)
     return EnergyCurve(
-        path=path,
+        path=path.every(finer),
         crease=int(model.creases_edges[traced.place]),
         barrier=0.0 if top is None else top.energy,
         barrier_angle=None if top is None else top.angle,
@@ -204,83 +200,19 @@ def _stationary(traced: Traced, path: Path) -> tuple[list[StableState], list[Sta
     """The maxima and minima of the energy strictly between the first and the last state."""
     maxima: list[StableState] = []
     minima: list[StableState] = []
-    points = _filled(traced, path)
-    loads = np.array([point.load for point in points])
-    turns = np.flatnonzero(loads[1:-1] * loads[2:] < 0) + 1
-    for k in turns.tolist():
-        first = max(0, min(k + 1 - LONGEST // 2, len(points) - LONGEST))
-        known = [point.known for point in points[first : first + LONGEST]]
-        rising = loads[k] * (points[k + 1].known.drive - points[k].known.drive) > 0
+    turns = np.flatnonzero(path.loads[1:-1] * path.loads[2:] < 0) + 1
+    for k in turns:
+        first = max(0, min(int(k) + 1 - LONGEST // 2, len(path.drives) - LONGEST))
+        near = slice(first, first + LONGEST)
+        known = [
+            Known(float(drive), state)
+            for drive, state in zip(path.drives[near], traced.states[near], strict=True)
+        ]
+        rising = path.loads[k] * (traced.drives[k + 1] - traced.drives[k]) > 0
         states = maxima if rising else minima
-        found = without_load(traced.driven, known, k - first)
+        found = without_load(traced.driven, known, int(k) - first)
         states.append(StableState(found.drive, traced.driven.model.energy(found.state.points)))
     return maxima, minima
-
-
-class _Point(NamedTuple):
-    """A state on the path, with its energy and its load, the slope of the energy by the drive."""
-
-    known: Known
-    energy: float
-    load: float
-
-
-def _filled(traced: Traced, path: Path) -> list[_Point]:
-    """The states of the path, and more between two of them if the energy may turn there unseen."""
-    drives = path.drives.tolist()
-    known = [Known(*each) for each in zip(drives, traced.states, strict=True)]
-    energies, loads = path.energies.tolist(), path.loads.tolist()
-    loads[0] = 0.0  # the folded form is at rest, but for rounding
-    points = [_Point(*each) for each in zip(known, energies, loads, strict=True)]
-    fill = _Fill(
-        traced.driven,
-        LONGEST_STEP * abs(drives[-1] - drives[0]),
-        max(NOISE, LEAST_ENERGY * float(path.energies.max())),
-    )
-    filled = points[:1]
-    for point in points[1:]:
-        filled += [*fill.between(filled[-1], point, MOST_HALVINGS), point]
-    return filled
-
-
-class _Fill(NamedTuple):
-    """What fills a path: no step is to be longer than ``longest``, and none may hide a turn between
-    energies of which one is above ``least``.
-    """
-
-    driven: Driven
-    longest: float
-    least: float
-
-    def between(self, left: _Point, right: _Point, halvings: int) -> list[_Point]:
-        """States between two, the step halved up to so many times."""
-        drives = np.array([left.known.drive, (left.known.drive + right.known.drive) / 2])
-        if not halvings or not (
-            2 * abs(drives[1] - drives[0]) > self.longest
-            or (max(left.energy, right.energy) > self.least and _hides_turn(left, right))
-        ):
-            return []
-        way = follow(self.driven, left.known.state, drives)
-        if len(way) < len(drives):
-            return []
-        middle, drive = way[-1], float(drives[1])
-        load = self.driven.load(middle, drive)
-        point = _Point(Known(drive, middle), self.driven.model.energy(middle.points), load)
-        before = self.between(left, point, halvings - 1)
-        return [*before, point, *self.between(point, right, halvings - 1)]
-
-
-def _hides_turn(left: _Point, right: _Point) -> bool:
-    """Whether the energy may turn between two states though the sign of the load does not tell.
-
-    Of the cubic with their energies and loads it is certain that it does not turn if no load is
-    more than three times the mean slope, and of its sign (F. N. Fritsch and R. E. Carlson, Monotone
-    piecewise cubic interpolation, SIAM J. Numer. Anal. 17 (1980)).
-    """
-    if left.load * right.load < 0:
-        return False
-    slope = (right.energy - left.energy) / (right.known.drive - left.known.drive)
-    return any(load * slope < 0 or abs(load) > 3 * abs(slope) for load in (left.load, right.load))
 
 
 def _stiffness(traced: Traced) -> float:

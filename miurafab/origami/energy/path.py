@@ -49,6 +49,11 @@ class Path(Shown):
     converged: bool
     model: BarHingeModel
 
+    def every(self, count: int) -> Path:
+        """The path with one of ``count`` shapes, the first among them."""
+        named = ("coords", "drives", "energies", "loads")
+        return replace(self, **{name: getattr(self, name)[::count] for name in named})
+
 
 def folding_path(
     pattern: CreasePattern,

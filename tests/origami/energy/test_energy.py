@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,17 +26,14 @@ from scipy.optimize import minimize_scalar
 from miurafab.errors import InputError, PatternError
 from miurafab.geometry.angles import sector_angles
 from miurafab.geometry.quads import QuadGrid
-from miurafab.origami.energy import continuation, curve
 from miurafab.origami.energy.bar_hinge import Paper, flat_model, sheet_model
 from miurafab.origami.energy.continuation import follow
 from miurafab.origami.energy.curve import energy_curve
 from miurafab.origami.energy.driven import Driven
-from miurafab.origami.energy.equilibrium import EquilibriumState, Solution, solve
+from miurafab.origami.energy.equilibrium import EquilibriumState, solve
 from miurafab.origami.energy.hinges import hinge_angles, hinge_derivatives, hinge_gradients
 from miurafab.origami.energy.path import (
     NEARLY_FLAT,
-    Path,
-    Traced,
     folding_path,
     pulled_path,
 )
@@ -337,78 +334,23 @@ def test_a_kresling_cell_is_bistable_as_in_closed_form():
     assert energies.max() > 19
 
 
-@dataclass(frozen=True)
-class KnownEnergy:
-    """A sheet of one coordinate whose energy is a polynomial of the drive: nothing is solved."""
-
-    polynomial: np.polynomial.Polynomial
-
-    def energy(self, points):
-        return float(self.polynomial(points[0, 0]))
-
-    def state(self, drive):
-        return EquilibriumState(np.array([[drive, 0.0, 0.0]]), np.zeros(0), 0.0)
-
-    def load(self, state, drive):
-        assert state.points[0, 0] == pytest.approx(drive, abs=1e-12)
-        return float(self.polynomial.deriv()(drive))
-
-    @property
-    def model(self):
-        return self
-
-
-def known_turns(energy, drives, monkeypatch):
-    """The maxima and minima that are found of a polynomial, seen at ``drives`` alone."""
-    sheet = KnownEnergy(energy)
-    solved = []
-
-    def follow_known(driven, start, drives):
-        solved.extend(drives[1:])
-        return [driven.state(drive) for drive in drives]
-
-    def solve_known(driven, guess, drive, factored=None):
-        return Solution(driven.state(drive), None, True)
-
-    monkeypatch.setattr(curve, "follow", follow_known)
-    monkeypatch.setattr(continuation, "solve", solve_known)
-    states = [sheet.state(drive) for drive in drives]
-    slope = energy.deriv()
-    path = Path(None, drives, energy(drives), slope(drives), True, None)
-    maxima, minima = curve._stationary(Traced(sheet, 0, drives, states), path)
-    return [each.angle for each in maxima], [each.angle for each in minima], solved
-
-
-@pytest.mark.parametrize("steps", [1, 2, 3, 4, 7, 40])
-@pytest.mark.parametrize("other", [1.85, 1.7, 1.0, 0.2])
-def test_a_turn_within_one_step_is_found_as_in_closed_form(steps, other, monkeypatch):
-    """E = (x - 2)^2 (x - b)^2 is 0 in the folded form and at b, with its maximum half-way; near it
-    only the first step may go.
+@pytest.mark.parametrize(("columns", "ratio"), [(4, 0.0), (5, 1e-4)])
+def test_the_barrier_does_not_depend_on_the_number_of_steps(columns, ratio):
+    """In few long steps the sheet is over its barrier after the first, at 99 of 131 degrees; where
+    there is none, it jumps to another shape in the last.
     """
-    factor = np.polynomial.Polynomial
-    energy = (factor([-2.0, 1.0]) * factor([-other, 1.0])) ** 2
-    maxima, minima, _ = known_turns(energy, np.linspace(2.0, 0.05, steps + 1), monkeypatch)
-    assert maxima == pytest.approx([(2.0 + other) / 2], abs=1e-6)
-    assert minima == pytest.approx([other], abs=1e-6)
-
-
-def test_energy_that_only_rises_is_looked_at_in_steps_of_a_sixteenth(monkeypatch):
-    energy = np.polynomial.Polynomial([4.0, -4.0, 1.0])
-    for steps, more in ((1, 15), (2, 14), (16, 0), (40, 0)):
-        drives = np.linspace(2.0, 0.0, steps + 1)
-        maxima, minima, solved = known_turns(energy, drives, monkeypatch)
-        assert (maxima, minima, len(solved)) == ([], [], more)
-
-
-def test_the_barrier_does_not_depend_on_the_number_of_steps():
-    """In few steps the sheet is over its barrier after the first, at 99 of 131 degrees."""
-    pattern = nearly_foldable("hypar", None, 4)
-    barrier = energy_curve(pattern, 40)
-    for steps in (1, 2, 3, 4):
-        found = energy_curve(pattern, steps)
-        assert found.bistable
-        assert found.barrier == pytest.approx(barrier.barrier, rel=1e-6)
-        assert found.barrier_angle == pytest.approx(barrier.barrier_angle, rel=1e-4)
+    pattern = nearly_foldable("hypar", None, columns)
+    model = sheet_model(pattern, crease_ratio=ratio)
+    finely = energy_curve(pattern, 40, model=model)
+    assert finely.bistable == (ratio == 0)
+    for steps in (1, 2, 3, 5, 23):
+        found = energy_curve(pattern, steps, model=model)
+        assert len(found.stable) == len(finely.stable)
+        assert found.barrier == pytest.approx(finely.barrier, rel=1e-6)
+        drives = np.linspace(finely.path.drives[0], finely.path.drives[-1], steps + 1)
+        np.testing.assert_allclose(found.path.drives, drives, rtol=1e-12)
+        assert len(found.path.coords) == steps + 1
+        assert found.path.loads[-1] == pytest.approx(finely.path.loads[-1], rel=1e-6)
 
 
 def test_a_single_vertex_of_degree_four_is_a_spherical_linkage():
