@@ -20,7 +20,7 @@ from miurafab.version import __version__
 COMMANDS = {
     "check": ("miurafab.check", ("check", "x.fold")),
     "fit": ("miurafab.design", ("fit", "hypar", "-o", "x.fold")),
-    "fold": ("miurafab.load", ("fold", "x.fold")),
+    "fold": ("miurafab.fold", ("fold", "x.fold")),
     "energy": ("miurafab.energy", ("energy", "x.fold")),
     "tradeoff": ("miurafab.tradeoff", ("tradeoff", "hypar")),
     "convert": ("miurafab.convert", ("convert", "x.fold", "x.svg")),

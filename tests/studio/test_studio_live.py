@@ -16,7 +16,7 @@ from miurafab.studio import glance
 from miurafab.studio.bed_words import planned
 from miurafab.studio.glance import MOST, Glances, _stock
 from miurafab.studio.live import Live
-from miurafab.workflow import design as designs
+from miurafab.workflow import mesh_targets
 from miurafab.workflow.report_text import pattern_lines
 
 LAYOUT = {"machine": "grbl-laser-400", "material": "card-250", "options": {}}
@@ -152,7 +152,7 @@ def test_a_mesh_is_read_once_for_all_its_sizes(tmp_path, monkeypatch):
     file = tmp_path / "saddle.obj"
     file.write_bytes(saddle_obj())
     read = []
-    monkeypatch.setattr(designs, "load_mesh", lambda *a, _of=designs.load_mesh, **k: (
+    monkeypatch.setattr(mesh_targets, "load_mesh", lambda *a, _of=mesh_targets.load_mesh, **k: (
         read.append(1), _of(*a, **k))[1])  # fmt: skip
     glances = Glances()
     sizes = []
