@@ -80,8 +80,8 @@ if TYPE_CHECKING:
     from miurafab.workflow.dry_run import SheetPreview as SheetPreview
     from miurafab.workflow.energy import energy as energy
     from miurafab.workflow.fit import fit as fit
-    from miurafab.workflow.fold import Folding as Folding
     from miurafab.workflow.fold import fold as fold
+    from miurafab.workflow.folding import Folding as Folding
     from miurafab.workflow.job_directory import JobDirectory as JobDirectory
     from miurafab.workflow.job_directory import read_job as read_job
     from miurafab.workflow.layers import Layers as Layers

@@ -15,7 +15,7 @@ from miurafab.options import File, read_options
 
 if TYPE_CHECKING:
     from miurafab.origami.folding.kinematics import FoldingMotion
-    from miurafab.workflow.fold import Folding
+    from miurafab.workflow.folding import Folding
 
 EXAMPLES = (
     "miurafab fold hypar.fold -o hypar.gif",
@@ -66,7 +66,6 @@ def fold(
     nearly flat to the folded form of the file, or from flat by mountains and valleys alone. The
     answer says which, and whether the facets could all stay flat.
     """
-    from miurafab.origami.formats.panels import PANEL_ENDINGS
     from miurafab.workflow.fold_options import ENDINGS, FoldOptions, check_colour
 
     asked = read_options(FoldOptions, given)
@@ -74,6 +73,8 @@ def fold(
         new_file(out, "The motion", ENDINGS)
         check_colour(out, by_strain=asked.colour == "strain")
     if panels is not None:
+        from miurafab.origami.formats.panels import PANEL_ENDINGS
+
         new_file(panels, "The drawing of the panels", PANEL_ENDINGS)
         if asked.thickness_mm is None:
             raise InputError(f"{panels} needs a `thickness` of the panels, such as 3mm.")
@@ -81,16 +82,16 @@ def fold(
         raise OptionError("method", "is for panels; add a `thickness` such as 3mm")
     # panels are of the same reading of the file
     pattern = file if asked.thickness_mm is None else miurafab.load(file)
-    from miurafab.workflow.panels import thickness_report
-
     with console.progress("folding") as progress:
         folding = miurafab.fold(pattern, asked.steps, timeout=asked.timeout, on_progress=progress)
-        thick = None
+        thick = made = None
         if asked.thickness_mm is not None:
+            from miurafab.workflow.panels import thickness_report
+
             thick = miurafab.thick_panels(
                 pattern, asked.thickness_mm, method=asked.method, on_progress=progress
             )
-        made = None if thick is None else thickness_report(thick)
+            made = thickness_report(thick)
         written = None if made is None or made["facets_too_small"] else panels
         if out is not None:
             folding.save(

@@ -33,8 +33,6 @@ LIBRARIES = [
 NOTHING = set()
 SHAPES = {"numpy", "shapely"}
 """What a file is read with."""
-PATTERN = SHAPES | {"scipy.sparse", "scipy.linalg"}
-"""What a pattern is computed with."""
 
 STARTS = {
     "--help": NOTHING,
@@ -61,7 +59,7 @@ STARTS = {
     "sheets gone.fold -o x": SHAPES,
     "preview gone": SHAPES,
     "cut gone --port virtual": SHAPES,
-    "fold gone.fold": PATTERN,
+    "fold gone.fold": SHAPES,
 }
 STARTED = """
 import sys

@@ -21,7 +21,8 @@ from test_fold_page import move, seen
 from miurafab.geometry.polygons import edge_lengths, facet_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.folding.contact import triangulate
-from miurafab.workflow.fold import Folding, fold
+from miurafab.workflow.fold import fold
+from miurafab.workflow.folding import Folding
 from miurafab.workflow.panels import thick_panels
 
 HALF_FIELD = math.tan(math.radians(16))
