@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from miurafab.errors import InputError
@@ -14,9 +13,8 @@ from miurafab.workflow.fold_options import FoldOptions
 from miurafab.workflow.patterns import PatternLike, movable_pattern
 
 if TYPE_CHECKING:
+    from miurafab.origami.folding.motion import Progress
     from miurafab.workflow.folding import Folding
-
-Progress = Callable[[float, str], None]
 
 
 @verb

@@ -9,7 +9,7 @@ vertices along straight lines, which no paper could follow.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +35,7 @@ from miurafab.origami.folding.kinematics import (
 )
 from miurafab.origami.folding.layers import LayerOrder, layer_order
 from miurafab.origami.folding.layers_apart import CLOSED, layer_shifts, split_facets
-from miurafab.origami.folding.motion import FoundMotion, find_motion
+from miurafab.origami.folding.motion import FoundMotion, Progress, find_motion
 from miurafab.origami.folding.ramp_motion import RampVerdict
 from miurafab.origami.formats.fold import write_fold
 from miurafab.origami.formats.mesh import glb_bytes
@@ -46,8 +46,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from miurafab.workflow.page import Curve
-
-Progress = Callable[[float, str], None]
 
 _NO_STRAIN, _NO_ENERGY = 1e-9, 1e-12
 """Strains, and energies in k_f times the mean edge, that are rounding."""

@@ -231,7 +231,7 @@ def parse_fold(document: Any) -> CreasePattern:
     edges = edges_in(key)
     assignment = assignments_in(key, len(edges))
     own = fold_angles_in(key, assignment, np.nan)
-    unsized = told_without_sizes(key, assignment)
+    unsized = told_without_sizes(key, assignment, own)
     given = "faces_vertices" in key
     if not given and len(frames) == 1 and _are_lines(flat, edges, assignment):
         drawn = pattern_from_lines(CreaseLines(flat[edges], assignment, own))

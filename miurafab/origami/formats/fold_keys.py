@@ -153,11 +153,13 @@ def fold_angles_in(
 
 
 def told_without_sizes(
-    document: Mapping[str, Any], assignment: NDArray[np.str_]
+    document: Mapping[str, Any], assignment: NDArray[np.str_], angles: Floats
 ) -> tuple[Finding, ...]:
-    """The finding on a file that gives mountains and valleys as 0 degrees, and none as more."""
+    """The finding on a file that gives mountains and valleys as 0 degrees, and none as more; of
+    ``angles`` (E,) those are NaN that it lacks (:func:`fold_angles_in`).
+    """
     folds = np.isin(assignment, ("M", "V"))
-    known = np.isfinite(fold_angles_in(document, assignment, math.nan))
+    known = np.isfinite(angles)
     given = [angle is not None for angle in document.get("edges_foldAngle") or [None] * len(folds)]
     if known[folds].any() or not np.array(given)[folds].any():
         return ()

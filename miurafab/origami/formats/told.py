@@ -19,8 +19,8 @@ def told_of_lines(
 ) -> tuple[Finding, ...]:
     """What became of ``lines``, of which m sides were made: ``source`` (m,) is the line of each
     side, ``stands_for`` (m,) the side of the pattern in its place, -1 for none, ``lengths`` (m,)
-    how long it is on the paper, and ``holes`` (h,) the area of each
-    hole over that of all facets and holes.
+    how long it is on the paper, and ``holes`` (h,) the area of each hole over that of all facets
+    and holes.
     """
     return tuple(_told(lines, source, stands_for, lengths, holes))
 
