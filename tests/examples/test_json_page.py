@@ -55,6 +55,19 @@ def test_the_page_has_the_fields_of(folder, section):
     assert set(_printed(SECTIONS[section], folder)) == _fields(section)
 
 
+def test_a_motion_from_flat_has_fields_of_its_own(folder):
+    """A waterbomb base: six creases meet, so that no closed form is known."""
+    rim = [(-9, -9), (9, -9), (9, 0), (9, 9), (-9, 9), (-9, 0)]
+    bomb = {
+        "vertices_coords": [(0, 0), *rim],
+        "edges_vertices": [(0, k) for k in range(1, 7)] + [(k, k % 6 + 1) for k in range(1, 7)],
+        "edges_assignment": [*"VVMVVM", *"BBBBBB"],
+    }
+    (folder / "bomb.fold").write_text(json.dumps(bomb))
+    printed = set(_printed("miurafab fold bomb.fold --json --steps 2", folder))
+    assert printed == _fields("fold") | _fields("fold from flat")
+
+
 def test_a_check_has_the_fields_that_are_marked(folder):
     marked = {
         name

@@ -93,6 +93,14 @@ class BarHingeModel:
         """(B,) the strains of bars that are the vectors ``d`` (B, 3)."""
         return np.asarray((np.einsum("bk,bk->b", d, d) - self.lengths**2) / (2 * self.lengths))
 
+    def stretched(self, points: Floats) -> Floats:
+        """(B,) the relative change of each bar's length at ``points`` (V, 3).
+
+        Changes of bars shorter than a hundredth of the unit are relative to that.
+        """
+        changed = np.linalg.norm(self.bar_vectors(points), axis=1) - self.lengths
+        return np.asarray(changed / np.maximum(self.lengths, 0.01))
+
     def energy(self, points: Floats) -> float:
         """The energy at ``points`` (V, 3); bars of compliance 0 add nothing."""
         bend = hinge_angles(points, self.hinges) - self.rest

@@ -30,7 +30,7 @@ from miurafab.origami.folding.laying import laid_on_each_other
 from miurafab.origami.piece import pieces_of
 
 EXACT = 1e-14
-"""A residual that ends the iteration: relative changes of length, and radians."""
+"""A residual that ends the iteration: changes of length in mean edges, and radians."""
 ROUNDS = 12
 LEAST_LENGTH = 1e-9
 """The weight of the length of a step: it chooses among the motions that the facets leave free."""
@@ -43,9 +43,9 @@ class RigidCertificate:
     """What the projection found.
 
     ``rigid`` is whether every frame is rigid. ``state`` is the frame that decides, the first that
-    is not rigid or that of the largest residual; ``residual`` the largest relative change of a
-    length, or bend of a facet in radians, that is left there; ``moved`` the farthest turn of a
-    crease, radians.
+    is not rigid or that of the largest residual; ``residual`` the largest change of a length
+    in mean edges, or bend of a facet in radians, that is left there; ``moved`` the farthest turn
+    of a crease, radians.
     """
 
     rigid: bool

@@ -64,8 +64,8 @@ def _bends(certificate: RigidCertificate, motion: FoldingMotion) -> Finding:
     return Finding(
         "bent-facets",
         f"The sheet does not fold rigidly, so its facets bend: {where} no shape with flat facets "
-        f"is near: sides stay off by up to {100 * left:.2g} %, or facets bent by up to "
-        f"{math.degrees(left):.2g} degrees{rounding}.",
+        f"is near: sides stay off by up to {100 * left:.2g} % of the mean edge, or facets "
+        f"bent by up to {math.degrees(left):.2g} degrees{rounding}.",
     )
 
 
@@ -89,8 +89,8 @@ def _of_ramp(verdict: RampVerdict, last: float) -> Iterator[Finding]:
     if verdict.strain.max() > STRETCH:
         yield Finding(
             "stretched",
-            f"On the way a side changes its length by up to {verdict.strain.max():.2g}: paper that "
-            "does not stretch would lock.",
+            f"On the way a side changes its length by up to {100 * verdict.strain.max():.2g} %: "
+            "paper that does not stretch would lock.",
         )
     if verdict.unstable.any():
         frames = f"{int((verdict.unstable > 0).sum())} of {len(verdict.unstable)} positions"

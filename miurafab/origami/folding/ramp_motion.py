@@ -39,11 +39,13 @@ class RampVerdict:
     ``waiting_edges`` cannot begin with flat facets while the others do
     (:mod:`miurafab.origami.folding.first_order`).
     ``unstable`` (T,) is the number of directions in which each frame is no minimum of the energy,
-    ``strain`` (T,) the largest relative change of a side, ``angle_error`` the mean distance from
-    the fold angles asked for in the last frame, radians, and ``snaps`` the number of jumps. If
-    ``complete`` is False the way was lost before its end. ``touching`` tells whether springs kept
-    facets from passing through each other. A sheet too large to be followed again in finer steps,
-    with softer paper or with contact is followed again in so few steps as ``followed_again``.
+    ``strain`` (T,) the largest relative change of a side or of a diagonal about which a facet may
+    bend (:meth:`~miurafab.origami.energy.bar_hinge.BarHingeModel.stretched`), ``angle_error`` the
+    mean distance from the fold angles asked for in the last frame, radians, and ``snaps`` the
+    number of jumps. If ``complete`` is False the way was lost before its end. ``touching`` tells
+    whether springs kept facets from passing through each other. A sheet too large to be followed
+    again in finer steps, with softer paper or with contact is followed again in so few steps as
+    ``followed_again``.
     """
 
     wrong_edges: Ints
@@ -173,8 +175,8 @@ def _verdict(
     for path in paths:
         for number, frame in enumerate(path.frames[:count], 1):
             unstable[number] += frame.unstable
-            stretch = float(np.abs(path.model.strains(frame.points)).max())
-            strain[number] = max(strain[number], stretch)
+            stretched = path.model.stretched(frame.points)
+            strain[number] = max(strain[number], float(np.abs(stretched).max()))
     return RampVerdict(
         wrong_edges=np.concatenate(wrong),
         waiting_edges=waiting,

@@ -164,6 +164,9 @@ def test_a_pleated_hypar_leaves_the_plane_by_stretching_a_little() -> None:
     assert not len(found.verdict.wrong_edges)
     assert not found.verdict.unstable.any()
     assert 1e-3 < found.verdict.strain.max() < 1e-2
+    # its facets are triangles, whose sides are all that can stretch
+    stretched = facet_strain(found.motion.pattern, found.motion.frames).max(axis=1)
+    assert found.verdict.strain == pytest.approx(stretched)
     assert not found.motion.is_rigid
     last = found.motion.frames[-1]
     size = np.linalg.norm(np.ptp(last, axis=0))
@@ -300,7 +303,7 @@ def test_the_verdict_of_a_way_from_flat_is_told_by_its_figures() -> None:
         "which no facet passes through another.",
         "wrong-signs": "25.0% of the folds end on the other side than their letter tells, the "
         "first being edge 5.",
-        "stretched": "On the way a side changes its length by up to 0.003: paper that does not "
+        "stretched": "On the way a side changes its length by up to 0.3 %: paper that does not "
         "stretch would lock.",
         "unstable": f"In {frames - 2} of {frames} positions the sheet is not stable and would snap "
         "away.",
