@@ -37,9 +37,9 @@ def counted(*names: str) -> Iterator[Counter[str]]:
     kept = {name: getattr(Balance, name) for name in names}
 
     def counting(name: str) -> Callable[..., object]:
-        def call(*given: object) -> object:
+        def call(*given: object, **named: object) -> object:
             calls[name] += 1
-            return kept[name](*given)
+            return kept[name](*given, **named)
 
         return call
 

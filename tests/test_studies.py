@@ -130,3 +130,10 @@ def test_the_sentences_of_the_study_are_those_of_its_tables():
     medians = [float(row[3].split()[0]) for row in rows]
     assert [row[0] for row in rows] == [f"{n} x {n}" for n in energy_study.GRIDS]
     assert max(medians) < 1
+
+
+def test_the_benchmark_of_energy_counts_factorisations_and_solutions():
+    """In one sheet of 4 x 4 facets: its columns are none where a call is passed by."""
+    row = study("energy").measure("hypar", 2, 4)
+    assert row["converged"]
+    assert 0 < row["factors"] < row["steps"]
