@@ -315,19 +315,28 @@ class VirtualGrbl:
                 if line is not None:
                     target = min(target, max(line, machine.now))
             change, arrival, due = stepper.change, uart.next_arrival(), self._due()
-            now = target + 1
-            for event in (change, arrival, due):
+            end = now = target + 1
+            for event in (change, due):
                 if event is not None and event < now:
-                    now = event
+                    end = now = event
+            if arrival is not None and arrival <= now and arrival != change:
+                now = arrival
             if now > target:
                 break
             machine.now = now
             if change == now:
                 processor.note(now)
                 stepper.run_to(now)
+                wakes = True
             elif arrival == now:
                 uart.arrive()
-            if due == now or self._wait is None:
+                # A program that waits with bytes in the ring waits for something else.
+                wakes = len(uart.ring) == 1 or machine.pending()
+                if not wakes and uart.ring:
+                    uart.fill(end)
+            else:
+                wakes = False
+            if due == now or (wakes and self._wait is None):
                 self._resume()
         machine.now = max(machine.now, target)
         return target

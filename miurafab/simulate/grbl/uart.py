@@ -63,6 +63,14 @@ class Uart:
             self._kept[-1] = byte
             self.lost += 1
 
+    def fill(self, end: int) -> None:
+        """Bytes that arrive before ``end`` and are for the ring, up to the first that is not."""
+        coming, realtime = self._coming, self.dialect.realtime
+        while coming and coming[0][0] < end and not self.deaf:
+            if coming[0][1] in realtime:
+                return
+            self._interrupt(*coming.popleft())
+
     def hear(self, now: int) -> None:
         """Enable interrupts: take the bytes that the hardware kept."""
         self.deaf = False
