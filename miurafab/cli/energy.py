@@ -145,6 +145,7 @@ def _pulled(answer: dict[str, Any]) -> dict[str, Any]:
         "Force": f"{answer['force_n']:.3g} N, {answer['largest_force_n']:.3g} N at most",
         **({} if left is None else {"Stays longer by": f"{round(left, 6) + 0.0:.3g} mm"}),
         "Creases that yield": f"{100 * answer['yielded']:.3g} %",
+        "Facets that cross": f"{answer['piercings']} pairs" if answer["piercings"] else "none",
         "Material": f"{answer['thickness_mm']:.3g} mm thick, modulus "
         f"{answer['modulus_pa'] / 1e9:.3g} GPa, crease length {answer['crease_length_mm']:.3g} mm",
     }

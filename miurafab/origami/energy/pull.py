@@ -23,6 +23,7 @@ from miurafab.origami.energy.bar_hinge import BarHingeModel, Paper, sheet_model
 from miurafab.origami.energy.continuation import Known, Progress, Walk, without_load
 from miurafab.origami.energy.result import EnergyResult
 from miurafab.origami.energy.yielding import YieldingDriven
+from miurafab.origami.folding.contact import most_meeting
 from miurafab.origami.piece import Piece, pieces_of
 
 if TYPE_CHECKING:
@@ -62,6 +63,8 @@ class PullCurve(EnergyResult):
         How far the rest angle of each crease of the piece has moved at the end, radians.
     converged : bool
         Whether all cycles were found; otherwise the curve ends where the sheet jumps away.
+    piercings : int
+        The most pairs of facets that pass through each other in a state of the first way out.
     """
 
     ends: tuple[int, int]
@@ -77,6 +80,7 @@ class PullCurve(EnergyResult):
     coords: Floats
     slips: Floats
     converged: bool
+    piercings: int = 0
 
     @property
     def extensions(self) -> Floats:
@@ -85,11 +89,8 @@ class PullCurve(EnergyResult):
 
     def loadings(self) -> list[tuple[Floats, Floats]]:
         """The extensions and forces on the way out, a pair for each cycle."""
-        ways = []
-        for cycle in range(1, int(self.cycles[-1]) + 1):
-            on = (self.cycles == cycle) & self.loading
-            ways.append((self.extensions[on], self.forces[on]))
-        return ways
+        ways = [(self.cycles == cycle) & self.loading for cycle in self._all]
+        return [(self.extensions[on], self.forces[on]) for on in ways]
 
     def changes(self) -> list[float]:
         """The largest difference in force, N, between each way out and the next, where both are."""
@@ -117,6 +118,7 @@ class PullCurve(EnergyResult):
             "second_cycle_change_n": changes[0] if changes else None,
             "third_cycle_change_n": changes[1] if len(changes) > 1 else None,
             "yielded": float((self.slips != 0).mean()),
+            "piercings": self.piercings,
             "thickness_mm": paper.thickness_mm,
             "modulus_pa": paper.modulus_pa,
             "crease_length_mm": paper.crease_length_mm,
@@ -154,7 +156,11 @@ class PullCurve(EnergyResult):
         return range(1, int(self.cycles[-1]) + 1)
 
     def verdict(self) -> str:
-        """The result in one sentence."""
+        """The result in one sentence, and another where facets pass through each other."""
+        through = " On the way facets pass through each other, as no paper does."
+        return self._said() + through * bool(self.piercings)
+
+    def _said(self) -> str:
         if not self.converged:
             reached = self.extensions[-1] / self.distances[0]
             return (
@@ -169,9 +175,8 @@ class PullCurve(EnergyResult):
                 f"At a strain of {self.strain:g} it goes farther by itself, and {abs(force):.3g} N "
                 "hold it back."
             )
-        said = (
-            f"{abs(force):.3g} N {'pull' if pulled else 'push'} it to a strain of {self.strain:g}"
-        )
+        way = "pull" if pulled else "push"
+        said = f"{abs(force):.3g} N {way} it to a strain of {self.strain:g}"
         if answer["yielded"] and left is not None:
             said += f"; let go, it stays {abs(left):.3g} mm {'longer' if left > 0 else 'shorter'}"
         return said + "."
@@ -242,7 +247,9 @@ def pull(
     )
     pulled = _Pulled(driven, strain, steps, cycles, on_progress)
     converged = pulled.run()
-    return _curve(pulled, pair, paper, converged, driven.slips[bending:])
+    curve = _curve(pulled, pair, paper, converged, driven.slips[bending:])
+    way_out = curve.coords[curve.loading & (curve.cycles == 1)]
+    return replace(curve, piercings=most_meeting(pattern, way_out))
 
 
 def _piece_of(

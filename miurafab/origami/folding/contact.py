@@ -23,6 +23,7 @@ from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs, run_st
 from miurafab.geometry.boxes import meeting_pairs
 from miurafab.geometry.polygons import signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.triangles import facet_triangles
 
 IN_PLANE = 1e-9
 """A corner closer to a plane than this part of the mean triangle side lies in the plane."""
@@ -44,6 +45,16 @@ def self_intersections(pattern: CreasePattern) -> Ints:
     if pattern.folded_coords is None:
         raise ValueError("the pattern has no folded form")
     return meeting_facets(pattern, pattern.folded_coords)
+
+
+def most_meeting(pattern: CreasePattern, shapes: Floats) -> int:
+    """The most pairs of facets that pass through each other in one of the ``shapes`` (n, V, 3).
+
+    Bent facets are the triangles of the bar-and-hinge model.
+    """
+    flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    split = facet_triangles(flat, pattern.faces_vertices)
+    return max((len(meeting_facets(pattern, points, split)) for points in shapes), default=0)
 
 
 def crossing_triangles(points: Floats, triangles: Ints) -> Ints:

@@ -17,7 +17,9 @@ from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import Paper
 from miurafab.origami.energy.pull import pull
 from miurafab.origami.energy.pull_plot import draw_pull
+from miurafab.origami.energy.triangles import facet_triangles
 from miurafab.origami.fitting.fit import FitRequest, fit
+from miurafab.origami.folding.contact import meeting_facets
 from miurafab.origami.folding.kinematics import rigid_motion
 from miurafab.origami.piece import pieces_of
 from miurafab.surfaces.catalogue import make_surface
@@ -152,6 +154,22 @@ def test_the_verdict_tells_pull_from_push():
     assert pushed.verdict().startswith(f"{-force:.3g} N push it to a strain of -0.1")
     pulled = pull(hypar(), PAPER, strain=0.25, steps=6, cycles=1)
     assert f"it stays {pulled.report()['set_mm']:.3g} mm longer" in pulled.verdict()
+
+
+def test_facets_that_pass_through_each_other_on_the_way_are_told():
+    """Pushed together at the middles of two sides, the hypar closes through itself."""
+    pushed = pull(hypar(), PAPER, (3, 45), strain=-0.5, steps=10, cycles=1)
+    split = facet_triangles(
+        np.pad(hypar().vertices_coords, ((0, 0), (0, 1))), hypar().faces_vertices
+    )
+    last = pushed.coords[np.flatnonzero(pushed.loading)[-1]]
+    assert pushed.piercings >= len(meeting_facets(hypar(), last, split)) > 0
+    assert pushed.report()["piercings"] == pushed.piercings
+    through = " On the way facets pass through each other, as no paper does."
+    assert pushed.verdict().endswith(through)
+    pulled = pull(hypar(), PAPER, strain=0.1, steps=3, cycles=1)
+    assert pulled.piercings == 0
+    assert through not in pulled.verdict()
 
 
 def test_creases_that_keep_their_rest_leave_no_set():
