@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,7 @@ print(json.dumps({fault["becomes"]: how for fault, how, _ in mutants.run("", are
 """
 
 
+@cache
 def within(path, name):
     """The lines of a function or class of a module, without what stands before them."""
     text = (ROOT / path).read_text(encoding="utf-8")
@@ -60,17 +62,26 @@ def test_a_fault_that_a_test_sees_is_told_from_one_that_none_sees():
     lines = (ROOT / module).read_text(encoding="utf-8").splitlines()
     (place,) = [i for i, line in enumerate(lines) if line.strip().startswith("def ")][-1:]
     fault = {"module": module, "within": "", "statement": [place + 1, place + 1]}
-    harmless = fault | {"lines": [place, place], "was": "", "becomes": "    # Nothing."}
-    fatal = fault | {
-        "lines": [place, place + 1],
-        "was": lines[place],
-        "becomes": "    def no(self):",
-    }
+    within = fault | {"lines": [place + 1, place + 1], "was": ""}
+    harmless = [
+        within | {"lines": [place, place], "becomes": "    # Nothing."},
+        within | {"becomes": "        pass"},
+    ]
+    fatal = [
+        within | {"lines": [place, place + 1], "becomes": "    def no(self):"},
+        within | {"becomes": "        raise KeyboardInterrupt"},
+        within | {"becomes": "        return 3"},
+    ]
     area = {"modules": [module], "tests": ["tests/wire/test_line_reader.py"]}
     call = [sys.executable, "-c", JUDGE, str(ROOT / ".ci")]
     done = subprocess.run(
-        [*call, json.dumps([area, [harmless, fatal]])], capture_output=True, text=True, cwd=ROOT
+        [*call, json.dumps([area, harmless + fatal])], capture_output=True, text=True, cwd=ROOT
     )
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout.splitlines()[-1])
-    assert told == {harmless["becomes"]: "survived", fatal["becomes"]: "killed"}
+    first, *_, last = done.stdout.splitlines()
+    assert "5 faults, 2 of them each with its module loaded" in first
+    assert json.loads(last) == {
+        fault["becomes"]: how
+        for faults, how in ((harmless, "survived"), (fatal, "killed"))
+        for fault in faults
+    }
