@@ -18,10 +18,8 @@ import numpy as np
 from miurafab.display import Shown
 from miurafab.errors import InputError, PatternError
 from miurafab.fabrication.glue import glued_shell, laid_on
-from miurafab.fabrication.options import LayoutOptions
 from miurafab.fabrication.recover import recovered_corners
 from miurafab.fabrication.retrace import patches_on_sheets
-from miurafab.fabrication.sheets import worked
 from miurafab.files import AnyPath, as_path
 from miurafab.gcode.job import Job
 from miurafab.geometry.arrays import Floats
@@ -31,7 +29,6 @@ from miurafab.machine.planning import plan_job
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VirtualTransport
-from miurafab.options import read_options
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.formats.fold import read_fold
@@ -40,7 +37,7 @@ from miurafab.profiles import MachineProfile
 from miurafab.surfaces.description import described_surface
 from miurafab.workflow.job_directory import read_written
 from miurafab.workflow.job_files import job_material
-from miurafab.workflow.manifest import MANIFEST, pattern_name, read_manifest
+from miurafab.workflow.manifest import pattern_name, read_manifest
 
 
 @dataclass(frozen=True, repr=False)
@@ -117,8 +114,7 @@ def rebuild(directory: AnyPath) -> Rebuilt:
     pattern = read_fold(folder / pattern_name(folder, manifest))
     if pattern.folded_coords is None:
         raise PatternError(f"{folder}: the pattern has no folded form to compare with.")
-    options = read_options(LayoutOptions, manifest.options, where=MANIFEST, folder=folder)
-    material = worked(job_material(layout.material, folder), machine, options)
+    kerf = job_material(layout.material, folder).kerf_mm
     outlined, _, motion = patches_on_sheets(layout, pattern)
     names = (name for name, _ in written.passes)
     burnt = {name: _burnt(job, machine) for name, job in zip(names, written.jobs, strict=True)}
@@ -129,7 +125,7 @@ def rebuild(directory: AnyPath) -> Rebuilt:
             over = np.array([sheet.width_mm, 0.0, sheet.width_mm, 0.0])
             parts.append(over + burnt[sheet.back] * [-1, 1, -1, 1])
         sheets.append(np.concatenate(parts))
-    corners = recovered_corners(pattern, outlined, motion, material.kerf_mm, sheets)
+    corners = recovered_corners(pattern, outlined, motion, kerf, sheets)
     shell = glued_shell(pattern, outlined.face_patch, corners)
     known = np.isfinite(shell).all(axis=1)
     if known.sum() < 3:

@@ -335,6 +335,65 @@ def test_a_hold_that_is_pressed_as_the_job_begins_is_left_alone() -> None:
     assert b"~" not in wire.commands
 
 
+class Scripted(FakeWire):
+    """From the fourth second on, keys are pressed and reports tell states as ``script`` says; where
+    a report is ``late``, the keys before it are pressed while its query is unanswered.
+    """
+
+    def __init__(self, *script: str, late: bool) -> None:
+        super().__init__(new_wire().device)
+        self.script, self.late, self.kept = list(script), late, b""
+
+    def pressed(self) -> str:
+        due = self.now() > 4.0 and self.script and self.script[0] in (" ", "r", " r", "  ")
+        return self.script.pop(0) if due and (self.kept or not self.late) else ""
+
+    def read(self, timeout: float) -> bytes:
+        said, self.kept = self.kept + super().read(timeout), b""
+        if self.now() < 4.0 or b"<" not in said or not self.script:
+            return said
+        if self.script[0].strip(" r") == "":
+            self.kept = said
+            return b""
+        states = self.script.pop(0).split()
+        return b"".join(re.sub(rb"<\w+(:\d)?", b"<" + each.encode(), said) for each in states)
+
+
+@pytest.mark.parametrize(
+    ("script", "late", "resumes"),
+    [
+        ((" r", "Hold:1", "Hold:0"), False, 2),
+        ((" r", "Hold:0 Hold:0"), False, 2),
+        ((" r", "Run", "Hold:0"), False, 1),
+        ((" r", "Run", "Hold:0"), True, 2),
+        ((" r", "Run", "Run", "Hold:0"), True, 1),
+        ((" ", "Hold:0", "r", "Hold:0"), True, 1),
+        (("r", "Hold:0"), False, 1),
+        (("  ", "Hold:1", "Hold:0"), False, 0),
+    ],
+    ids=[
+        "forgotten",
+        "told twice",
+        "heard",
+        "told of before",
+        "told of before, and heard",
+        "heard at rest",
+        "no hold",
+        "no resume",
+    ],
+)
+def test_a_resume_is_sent_again_only_if_it_came_too_early(
+    script: tuple[str, ...], late: bool, resumes: int
+) -> None:
+    """A hold after it was heard is that of somebody at the machine."""
+    wire = Scripted(*script, late=late)
+    pressed_at_the_machine(wire, (9.0, b"~"))
+    job = Job("slow.nc", "M4 S0\nG1 X20 S500 F120\nM5\n")
+    deliver(plan_job(job, MACHINE), wire, StopSignals(), keys=wire)
+    assert wire.script == []
+    assert wire.commands.count(b"~") == resumes
+
+
 # What is sent and told
 
 

@@ -9,7 +9,7 @@ import shutil
 
 import pytest
 import shapely
-from piece_problems import gores, trimmed, two_trimmed_pieces
+from piece_problems import gores, inside_circle, trimmed, two_pieces
 
 import miurafab as mf
 from miurafab.errors import InputError, LayoutError
@@ -18,10 +18,13 @@ from miurafab.options import read_options, written_options
 from miurafab.profiles import load_material
 
 CASES = {
-    "gores": (gores(), {"border_tabs": "all", "tab_side": "alternate"}),
+    "gores": (gores(3, 12, 3), {"border_tabs": "all", "tab_side": "alternate"}),
     "trimmed": (trimmed(), {"max_patch": (90, 60), "bridges": 2, "quantity": 2}),
-    "knife": (gores(), {"machine": "grbl-knife-a3", "join": "slots"}),
-    "plotter": (two_trimmed_pieces(), {"machine": "grbl-pen-a4", "full_facet": True}),
+    "knife": (gores(3, 12, 3), {"machine": "grbl-knife-a3", "join": "slots"}),
+    "plotter": (
+        inside_circle(two_pieces(5, 5, 2), 0.45),
+        {"machine": "grbl-pen-a4", "full_facet": True},
+    ),
 }
 
 

@@ -19,11 +19,20 @@ from miurafab.fabrication.glue import glued_shell, laid_on
 from miurafab.fabrication.recover import RecoveredCorners
 from miurafab.geometry.polygons import facet_means
 from miurafab.motion.segments import SegmentGenerator
+from miurafab.origami.crease_pattern import CreasePattern
 
+TRIANGLE = CreasePattern(
+    vertices_coords=np.array([[0.0, 0.0], [40.0, 0.0], [10.0, 30.0]]),
+    edges_vertices=np.array([[0, 1], [1, 2], [2, 0]]),
+    edges_assignment=np.array(["B", "B", "B"]),
+    edges_fold_angle=np.zeros(3),
+    faces_vertices=np.array([[0, 1, 2]]),
+    folded_coords=np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [10.0, 30.0, 0.0]]),
+)
 CASES = {
-    "patches": (regular, {"max_patch": (60, 60)}),
-    "gores": (gores, {}),
-    "trimmed": (trimmed, {}),
+    "triangle": (lambda: TRIANGLE, {}),
+    "patches": (lambda: regular(5, 5), {"max_patch": (30, 60)}),
+    "gores": (lambda: gores(3, 12, 3), {}),
 }
 
 
@@ -36,8 +45,28 @@ def test_the_shell_glued_from_the_beam_log_is_the_folded_form(name, tmp_path):
     assert found.worst_mm < 0.05
 
 
+PLANE = {"surface": "plane", "parameters": {"width": 100.0, "depth": 100.0}}
+
+
+def test_what_burnt_lines_do_not_fix_is_left_out(tmp_path):
+    """Without its creases an inner corner has no place, nor has the mean of a facet there."""
+    pattern = replace(regular(4, 4), target=PLANE)
+    job = mf.sheets(pattern)
+    job.write(tmp_path)
+    (path,) = job.layout.toolpaths
+    at_corner = (path.edge >= 0) & (pattern.edges_vertices[path.edge] == 6).any(axis=1)
+    text = (tmp_path / "sheet-01.nc").read_text()
+    for x, y in path.starts[at_corner]:
+        text = re.sub(rf"G0 X{x:.3f} Y{y:.3f}\nG1.*\n", "", text)
+    (tmp_path / "sheet-01.nc").write_text(text)
+    found = mf.rebuild(tmp_path)
+    assert (found.corners, found.measured) == (16, 14)
+    assert 0 < found.worst_mm < 0.02
+    assert 0 < found.target_mm < 0.01
+
+
 def test_a_crease_burnt_beside_its_place_is_seen_in_the_shell(tmp_path):
-    mf.sheets(regular()).write(tmp_path)
+    mf.sheets(regular(5, 5)).write(tmp_path)
     file = tmp_path / "sheet-01.nc"
     whole = mf.rebuild(tmp_path).worst_mm
     # Every dash of one line, 0.1 mm to the side.
@@ -54,7 +83,7 @@ def test_a_crease_burnt_beside_its_place_is_seen_in_the_shell(tmp_path):
 
 def test_a_signal_while_the_beam_is_rebuilt_stops_it(tmp_path, monkeypatch):
     """In mid-move of the controller in memory, whose program must not be torn."""
-    mf.sheets(regular()).write(tmp_path)
+    mf.sheets(regular(4, 4)).write(tmp_path)
     segment, calls = SegmentGenerator.next, itertools.count()
 
     def pressed(self):
@@ -77,6 +106,8 @@ def test_facets_that_the_border_has_cut_are_left_out_as_in_check(tmp_path):
     target = {"surface": "plane", "parameters": {"width": 200.0, "depth": 200.0}, "edge": "trim"}
     mf.sheets(replace(cut, folded_coords=lowered, target=target)).write(tmp_path)
     found = mf.rebuild(tmp_path)
+    assert found.measured == found.corners == len(cut.vertices_coords)
+    assert found.worst_mm < 0.05
     assert found.folded_target_mm < 1e-6
     assert found.target_mm < 0.05
 
@@ -118,8 +149,7 @@ def test_what_is_scored_on_the_back_is_folded_and_glued_too(tmp_path):
 
 def test_distances_from_the_target_are_in_millimetres_of_the_shell(tmp_path):
     """The shell stands over a plane; its target is half as large."""
-    target = {"surface": "plane", "parameters": {"width": 100.0, "depth": 100.0}}
-    pattern = replace(regular(5, 5), scale=2.0, target=target)
+    pattern = replace(regular(5, 5), scale=2.0, target=PLANE)
     raised = replace(pattern, folded_coords=pattern.folded_coords + np.array([0.0, 0.0, 5.0]))
     mf.sheets(raised).write(tmp_path)
     found = mf.rebuild(tmp_path)
@@ -153,7 +183,9 @@ def uncut_by_circle(pattern):
 
 
 def test_only_the_job_of_a_laser_is_rebuilt(tmp_path):
-    mf.sheets(regular(), machine="grbl-pen-a4").write(tmp_path)
+    with pytest.raises(InputError, match="The job directory is 3, which is not a path"):
+        mf.rebuild(3)
+    mf.sheets(TRIANGLE, machine="grbl-pen-a4").write(tmp_path)
     with pytest.raises(InputError, match="is for a pen"):
         mf.rebuild(tmp_path)
 
