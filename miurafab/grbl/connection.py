@@ -13,7 +13,6 @@ firmware loses bytes that arrive during the write (``eeprom.c`` blocks the inter
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
@@ -30,9 +29,9 @@ from miurafab.grbl.events import (
     Options,
     StatusReport,
 )
+from miurafab.grbl.lines import is_system, writes_eeprom
 from miurafab.grbl.replies import parse_reply
 from miurafab.grbl.states import KEEPS_ACCOUNT, TRANSITIONS, Input, State
-from miurafab.units import DECIMAL
 from miurafab.wire.line_reader import LineReader
 
 SOFT_RESET = b"\x18"
@@ -40,31 +39,9 @@ STATUS_QUERY = b"?"
 PROBE = b"$I\n"
 FEED_HOLD = b"!"
 
-_WRITES_EEPROM = re.compile(
-    rb"^\$(?:N?[-+.\d]+|RST|I)=|G0*10(?![\d.])|G0*28\.10*(?!\d)|G0*30\.10*(?!\d)", re.IGNORECASE
-)
-_DWELL = re.compile(rb"G0*4(?![\d.])", re.IGNORECASE)
-_DWELL_SECONDS = re.compile(rf"P\+?({DECIMAL})".encode(), re.IGNORECASE)
-
 
 class ProtocolMisuse(RuntimeError):
     """The program sent something that the state of the connection forbids: a defect of miurafab."""
-
-
-def writes_eeprom(data: bytes) -> bool:
-    """Whether a line (blanks removed) makes the controller write its EEPROM.
-
-    ``$N=``, ``$Nn=``, ``$RST=``, ``$I=``, and G10, G28.1, G30.1 anywhere in a block.
-    """
-    return _WRITES_EEPROM.search(data) is not None
-
-
-def dwell_seconds(data: bytes) -> float:
-    """The seconds that a line (blanks removed) makes the controller wait: the P of a G4, or 0."""
-    if _DWELL.search(data) is None:
-        return 0.0
-    match = _DWELL_SECONDS.search(data)
-    return float(match[1]) if match is not None else 0.0
 
 
 class Connection:
@@ -182,9 +159,7 @@ class Connection:
 
 def _kind(data: bytes) -> Input:
     """Whether a line is motion or a system command; a jog is motion."""
-    if data.startswith(b"$") and data[1:2].upper() != b"J":
-        return Input.SYSTEM
-    return Input.MOTION
+    return Input.SYSTEM if is_system(data) else Input.MOTION
 
 
 _MESSAGES = {

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from miurafab.errors import ControllerError, GcodeError
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.codes import Code, alarm_codes, error_codes
-from miurafab.grbl.connection import Connection, dwell_seconds
+from miurafab.grbl.connection import Connection
 from miurafab.grbl.events import Alarm, Banner, Error, Event, Ok, StatusReport
+from miurafab.grbl.lines import dwell_seconds
 from miurafab.grbl.states import State
 
 

@@ -22,7 +22,7 @@ from miurafab.grbl.events import Error, Event, Ok, StatusReport
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S, RESTARTED
 from miurafab.machine.judge_words import leaves_air_on
-from miurafab.machine.keys import HOLD, RESUME
+from miurafab.machine.keys import HOLD, POWER, RESUME
 from miurafab.machine.preflight import (
     check_build,
     check_settings,
@@ -94,6 +94,7 @@ class GrblDriver(StreamDriver):
             session.home(self._take_keys)
             self.at_risk = False
         status = session.wait_status()
+        self.at_risk = status.beam_on
         lost = session.restarted_itself and plan.at is None
         forced = raise_findings(
             check_status(status, restarted=restarted, lost=lost),
@@ -209,17 +210,22 @@ class GrblDriver(StreamDriver):
         return _OTHER_PLACES.search(self.plan.job.text) is not None
 
     def obey(self) -> None:
-        """Send ``orders``, unless the controller is deaf while it writes its EEPROM."""
+        """Send ``orders``, unless the controller is deaf while it writes its EEPROM; those that
+        would light a resting beam (M3) when it moves again.
+        """
         session = self._session
         if not session.connection.writing_eeprom:
-            for order in self.orders:
+            orders, self.orders = self.orders, []
+            for order in orders:
+                if order in POWER and self._burns_at_rest and not _moves(session.status):
+                    self.orders.append(order)
+                    continue
                 session.write(session.connection.send_realtime(order))
                 # GRBL forgets a resume that comes before the hold has come to rest (protocol.c).
                 if order in (HOLD, RESUME):
                     early = order == RESUME and self.held and not _rests(session.status)
                     self._doubtful_reports = early * (1 + session.awaits_status)
                 self.held = order == HOLD or (self.held and order != RESUME)
-            self.orders.clear()
 
     def _resume_a_late_hold(self, report: StatusReport) -> None:
         """Send the resume again that came while the hold still braked."""
@@ -280,6 +286,11 @@ class GrblDriver(StreamDriver):
         program = self.plan.program
         laser = self.plan.machine.tool.kind == "laser"
         return laser and (program is None or bool((program.spindle == BEAM_M3).any()))
+
+
+def _moves(report: StatusReport | None) -> bool:
+    """Whether a change of the power reaches the moves: at rest GRBL sets the beam by it."""
+    return report is not None and report.state != "Idle"
 
 
 def _rests(report: StatusReport | None) -> bool:

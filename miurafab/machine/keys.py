@@ -33,6 +33,11 @@ Ctrl-X is GRBL's own soft reset: it ends a job at once, where ``q`` lets a dark 
 """
 
 
+POWER = (b"\x99", b"\x9a", b"\x9b", b"\x9c", b"\x9d")
+"""What changes the power. At rest GRBL then sets an armed beam anew, and lights that of M3 in laser
+mode though the motion mode keeps it dark (gnea/grbl 1.1, ``protocol.c``, ``spindle_control.c``)."""
+
+
 OVERRIDES_OFF = (b"\x90", b"\x95", b"\x99")
 """What sets feed, rapid rate and power back to what is written: a controller that was not reset may
 still override them, and some keep them over a reset (grblHAL, ``$676``)."""

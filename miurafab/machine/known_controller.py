@@ -9,7 +9,6 @@ overrides) is the conversation's. Both together are the :class:`MachineState`.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -17,6 +16,7 @@ from miurafab.errors import InputError
 from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.events import Event, Modes, Options, Parameter, StartupBlock, Version
+from miurafab.grbl.lines import writes_setting
 from miurafab.grbl.settings import Settings
 from miurafab.grbl.states import State
 from miurafab.machine.keys import OVERRIDES_OFF, obeys_overrides
@@ -28,7 +28,6 @@ from miurafab.profiles.machine import WAIT_S
 
 BUILD, SETTINGS, OFFSETS, MODES, STARTUP = "$I", "$$", "$#", "$G", "$N"
 _QUESTIONS = (BUILD, SETTINGS, OFFSETS, MODES, STARTUP)
-_WRITES_SETTING = re.compile(r"\$\s*(?:N?[-+.\d]+|RST|I)\s*=", re.IGNORECASE)
 _ANSWERS_IN = ("Idle", "Alarm")
 """The states in which GRBL answers its questions; ``error:8`` in the others (``system.c``)."""
 _REPORTS = 20
@@ -127,7 +126,11 @@ class KnownController:
             self._session.restarted_itself = False
             self._opened = True
             self._learn_overrides()
-        self.refresh()
+            self.refresh()
+            if self._session.runs_at_start:
+                self._session.wait_status()  # a block may have lit the beam since
+        else:
+            self.refresh()
 
     def _learn_overrides(self) -> None:
         """Ask until a report tells the overrides: a board that was not reset may have some."""
@@ -201,6 +204,7 @@ class KnownController:
         else:
             blocks = {each.number: each.text for each in said if isinstance(each, StartupBlock)}
             self.modes = ControllerModes(self.modes.modes, blocks)
+            self._session.runs_at_start = any(blocks.values())
 
     # What may have changed
 
@@ -216,14 +220,18 @@ class KnownController:
         """Something was sent that may change modes and offsets: a job, or a person's ``text``."""
         self._set = False
         self._unknown |= {OFFSETS, MODES}
-        if _WRITES_SETTING.match(text):
+        if writes_setting(text.encode("ascii")):
             self._unknown |= {SETTINGS, STARTUP, BUILD}
 
     # What a job needs
 
     def clear_overrides(self) -> None:
-        """Set feed, rapid rate and power back to what is written."""
+        """Set feed, rapid rate and power back to what is written, with no beam armed: at rest a
+        change of the power would light it.
+        """
         if obeys_overrides(self._dialect):
+            if self._session.overrides.power != AS_WRITTEN.power and self.state.idle:
+                self.disarm()
             for order in OVERRIDES_OFF:
                 self._session.write(self._session.connection.send_realtime(order))
 

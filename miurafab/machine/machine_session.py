@@ -6,8 +6,6 @@ jog, set the origin, frame, cut. A command such as ``machine jog`` is a session 
 
 Whatever may leave the machine moving or burning sets it at risk, and a status report that says idle
 and dark ends that. A session that is closed at risk resets the controller first.
-
-Marlin and HPGL machines only take jobs; the rest is done at their panel.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from miurafab.grbl.events import StatusReport
 from miurafab.machine.console_lines import ConsoleLines
 from miurafab.machine.job_sending import OpenWire, send_job
 from miurafab.machine.jog_pad import JogPad, require_way
-from miurafab.machine.keys import ABORT, RESET, RESUME, Keys, NoKeys, session_keys
+from miurafab.machine.keys import ABORT, POWER, RESET, RESUME, Keys, NoKeys, session_keys
 from miurafab.machine.known_controller import (
     STOCK,
     KnownController,
@@ -43,6 +41,7 @@ _POLL_S = 0.1
 _KEY_S = 0.01  # between two looks at the keyboard, if there is one
 _GO_MM_MIN = 3000.0
 _REALTIME = ("?", "!", "~")
+_RESTING = ("Idle", "Alarm", "Sleep", "Check")
 
 
 class MachineSession:
@@ -91,7 +90,10 @@ class MachineSession:
         :class:`~miurafab.errors.InputError` for a machine that only takes jobs.
         """
         require_talk(self._setup.dialect)
+        greets = not self.known.opened
         self.known.open(self._setup.wait if wait is None else wait, reset=reset)
+        if greets:
+            self._note(self.conversation.status)
         return self.state
 
     @property
@@ -126,10 +128,7 @@ class MachineSession:
         return self.state
 
     def watch(self, seconds: float) -> MachineState:
-        """Let ``seconds`` pass, keep the state true and the held jog going.
-
-        Raises what a refused jog raises.
-        """
+        """Let ``seconds`` pass, keep the state true and the held jog going."""
         session = self.conversation
         end = session.now() + seconds
         while True:
@@ -147,8 +146,8 @@ class MachineSession:
             if session.now() >= end:
                 return self.state
 
-    def _note(self, report: StatusReport) -> None:
-        self._at_risk = report.beam_on or report.state not in ("Idle", "Alarm", "Sleep", "Check")
+    def _note(self, report: StatusReport | None) -> None:
+        self._at_risk = report is not None and (report.beam_on or report.state not in _RESTING)
 
     # The keys
 
@@ -168,7 +167,10 @@ class MachineSession:
                 self.realtime(order)
 
     def realtime(self, order: bytes) -> None:
-        """Send one realtime byte, such as a feed hold."""
+        """Send one realtime byte, such as a feed hold, but none that lights a resting beam."""
+        if order in POWER and self.state.idle and "M5" not in self.state.modes:
+            self.lines.on_line("At rest a change of the power would light the armed beam.")
+            return
         self._at_risk = True
         self.conversation.write(self.conversation.connection.send_realtime(order))
 
@@ -201,14 +203,12 @@ class MachineSession:
         :class:`~miurafab.errors.ControllerError` if the controller refuses, as for a target outside
         its soft limits.
         """
-        words = require_way(x, y)
+        line = f"$J=G21{'G90' if absolute else 'G91'}{require_way(x, y)}F{feed_mm_min:g}"
         self.open()
         if absolute:
             self.known.set_modes()
         self._at_risk = True
-        self._or_stop(
-            lambda: self._run_jog(f"$J=G21{'G90' if absolute else 'G91'}{words}F{feed_mm_min:g}")
-        )
+        self._or_stop(lambda: self._run_jog(line))
         return self.look()
 
     def _run_jog(self, line: str) -> None:
@@ -231,10 +231,7 @@ class MachineSession:
             return
         session = self.conversation
         order = self._pad.next_order(
-            session.now(),
-            session.machine_position,
-            self.state.idle,
-            self.known.settings.values,
+            session.now(), session.machine_position, self.state.idle, self.known.settings.values
         )
         if order is None:
             return
@@ -301,8 +298,7 @@ class MachineSession:
     def load(self) -> MachineState:
         """Somebody has changed the material or turned it over; a lid opened for that is shut."""
         self.known.loaded = None
-        status = self.conversation.status
-        if status is None or (status.state, status.substate) != ("Door", 0):
+        if self.state.state != "Door:0":
             return self.state
         self.realtime(RESUME)  # nothing runs: the controller leaves the state Door
         return self.look()
@@ -313,10 +309,9 @@ class MachineSession:
         """
         self._pad.forget()
         session, self._at_risk, self._stops = self.conversation, True, True
-        status = session.status
-        jogs = status is not None and status.state == "Jog" and not status.beam_on
+        jogs = self.state.state == "Jog" and not self.state.beam_on and not at_once
         try:
-            dark = session.hold_and_stop() if jogs and not at_once else session.stop()
+            dark = session.hold_and_stop() if jogs else session.stop()
         finally:
             self._stops = False
         self._at_risk = not dark
@@ -392,9 +387,13 @@ class MachineSession:
     @contextmanager
     def _job(self) -> Iterator[None]:
         """A job leaves the machine safe, and may leave any mode and offset."""
-        self._in_job = True
+        risky, self._at_risk, self._in_job = self._at_risk, False, True
         try:
             yield
+        except BaseException:
+            if risky or (self.known.opened and self.state.beam_on):
+                self._note(self.conversation.status)  # it may not have begun
+            raise
         finally:
-            self._in_job = self._at_risk = False
+            self._in_job = False
             self.known.may_differ()

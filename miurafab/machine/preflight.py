@@ -75,8 +75,8 @@ def check_status(
     if status.beam_on:
         yield Finding(
             "beam",
-            "The controller reports the beam on before the job has begun; switch the laser off at "
-            "the machine and reset the controller.",
+            "The controller reports the beam on before the job has begun; look for what lit it, "
+            "such as a startup block ($N).",
         )
     if lost:
         yield Finding(

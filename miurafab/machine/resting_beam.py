@@ -5,25 +5,43 @@ not. With it, ``M3`` keeps the beam on at rest in ``G1``, ``G2`` and ``G3``, and
 (gnea/grbl 1.1, ``gcode.c``, ``spindle_control.c``). So after each such line the beam burns one spot
 until somebody ends that. Some want it, to focus; nobody wants it by mistake.
 
-A startup block (``$N0=``) runs when it is stored, and after each reset, in the order of the blocks
-(``system.c``), which then add up. GRBL reads its number as any other: ``$N00=`` is the same.
+Lines that are no program light it too (``system.c``, ``stepper.c``):
+
+* A startup block (``$N0=``) runs when it is stored, after each reset and after ``$H``, in the order
+  of the blocks, which then add up. After a reset they begin in the modes of power-up, after ``$H``
+  in those that are in force.
+* ``$32=0`` lights nothing at once, but the blocks of the next reset.
+* ``$RST=`` ends in a reset, and so does the ``$C`` that ends the check mode. ``$RST=$`` and
+  ``$RST=*`` bring back the firmware's own ``$32``, which is 0 in GRBL; ``*`` clears the blocks.
+* A jog moves with the beam that is armed, and leaves it on behind it, unless that is ``M4`` in
+  laser mode.
+
+GRBL reads the number of a block or a setting as any other: ``$N00=`` and ``$32.0=`` are the same.
 """
 
 from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from miurafab.errors import GcodeError
 from miurafab.gcode.block_errors import BlockError
 from miurafab.gcode.job import plain_code
+from miurafab.gcode.numbers import read_single, whole_byte
 from miurafab.gcode.words import split_words
 from miurafab.machine.known_controller import KnownController
+from miurafab.units import DECIMAL
 
 _LASER_MODE = 32
 _BURNING = (1.0, 2.0, 3.0)
-_STARTUP = re.compile(r"\$N[-+]?(\d*)\.?\d*=(.*)")
+_NUMBER = rf"([-+]?{DECIMAL})"
+_STARTUP = re.compile(rf"\$N{_NUMBER}=(.*)")
+_SETTING = re.compile(rf"\${_NUMBER}={_NUMBER}")
+_JOG = "G1"  # as far as the beam goes that a jog leaves on
+
+Words = list[tuple[str, float]]
 
 
 def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> float:
@@ -49,6 +67,15 @@ def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> fl
     return speed if armed else 0.0
 
 
+@dataclass(frozen=True)
+class _Lit:
+    """The S with which the beam is on at rest ``now`` and after the next reset, ``later``."""
+
+    now: float
+    later: float
+    laser_mode: bool
+
+
 class RestingBeam:
     """Knows which line was held back last, for the controller that is ``known``, and which were
     sent since that told its modes; mutable.
@@ -65,46 +92,68 @@ class RestingBeam:
         """
         held, self._held = self._held, ""
         read = plain_code("", 0, line)
-        block = _STARTUP.fullmatch(read)
-        if block is None and read.startswith("$"):
-            return line
         if line != held:
-            number, text = (None, read) if block is None else block.groups()
-            self._refuse(line, text, number)
-        self._since.append(read)  # a startup block was run before it is answered
+            self._refuse(line, read)
+        block = _STARTUP.fullmatch(read)
+        if block is not None or not read.startswith("$"):
+            self._since.append(read if block is None else block[2])  # it ran before its answer
         return line
 
-    def _refuse(self, line: str, text: str, number: str | None) -> None:
-        """Hold ``line`` back if its ``text`` would light the resting beam, or, as the startup block
-        of ``number`` among the others, each start would.
+    def _refuse(self, line: str, read: str) -> None:
+        """Hold ``line``, read as ``read``, back if it would light the resting beam, now or at each
+        start.
         """
-        state = self._known.state
+        state, known = self._known.state, self._known
         if state.modes:
             self._since.clear()  # else the controller does not tell them while it moves
-        laser_mode = bool(self._known.settings.values.get(_LASER_MODE))
-        before = [
-            word for mode in (*self._known.modes.modes, *self._since) for word in _words(mode)
-        ]
-        now = 0.0 if state.beam_off else resting_power(before, laser_mode=laser_mode)
-        power = resting_power([*before, *_words(text)], laser_mode=laser_mode)
-        later = 0.0
-        if number is not None:
-            blocks = {**self._known.modes.startup, int(number or 0): text}
-            start = [word for block in blocks.values() for word in _words(block)]
-            later = resting_power(start, laser_mode=laser_mode)
-        if power <= now and later == 0.0:
+        laser_mode = bool(known.settings.values.get(_LASER_MODE))
+        before = [word for mode in (*known.modes.modes, *self._since) for word in _words(mode)]
+        burns = 0.0 if state.beam_off else resting_power(before, laser_mode=laser_mode)
+        lit = _lit(read, before, known.modes.startup, laser_mode, checks=state.state == "Check")
+        if lit.now <= burns and lit.later == 0.0:
             return
         self._held = line
-        then, power = ("", power) if power > now else (" and the next reset", later)
-        end = "M5, and again after each reset" if later else "M5 or a reset"
+        then, power = ("", lit.now) if lit.now > burns else (" and the next reset", lit.later)
+        end = "M5, and again after each reset" if lit.later else "M5 or a reset"
         raise GcodeError(
             f"After {line}{then} the beam would be on, with S{power:g}, while the head rests "
-            f"(${_LASER_MODE}={laser_mode:d}): it burns one spot until {end}. Send the same line "
-            "again if you want that."
+            f"(${_LASER_MODE}={lit.laser_mode:d}): it burns one spot until {end}. Send the same "
+            "line again if you want that."
         )
 
 
-def _words(text: str) -> list[tuple[str, float]]:
+def _lit(
+    read: str, before: Words, startup: Mapping[int, str], laser_mode: bool, *, checks: bool
+) -> _Lit:
+    """What is lit by a line, behind the words ``before`` and with the blocks ``startup``;
+    ``checks``: the controller is in check mode.
+    """
+
+    def power(words: Iterable[tuple[str, float]], laser_mode: bool = laser_mode) -> float:
+        return resting_power(words, laser_mode=laser_mode)
+
+    def start(blocks: Mapping[int, str]) -> Words:
+        return [word for number in sorted(blocks) for word in _words(blocks[number])]
+
+    block, setting = _STARTUP.fullmatch(read), _SETTING.fullmatch(read)
+    if block is not None:
+        blocks = {**startup, whole_byte(read_single(block[1])): block[2]}
+        return _Lit(power([*before, *_words(block[2])]), power(start(blocks)), laser_mode)
+    if setting is not None and whole_byte(read_single(setting[1])) == _LASER_MODE:
+        after = whole_byte(read_single(setting[2])) != 0
+        return _Lit(0.0, power(start(startup), after) if after != laser_mode else 0.0, after)
+    if read.startswith("$RST=") or (read == "$C" and checks):
+        after = laser_mode and read not in ("$RST=$", "$RST=*")
+        at_start = power(start({} if read == "$RST=*" else startup), after)
+        return _Lit(at_start, at_start, after)
+    if read == "$H":
+        return _Lit(power([*before, *start(startup)]), 0.0, laser_mode)
+    if read.startswith("$J="):
+        return _Lit(power([*before, *_words(_JOG)]), 0.0, laser_mode)
+    return _Lit(0.0 if read.startswith("$") else power([*before, *_words(read)]), 0.0, laser_mode)
+
+
+def _words(text: str) -> Words:
     found = []
     with contextlib.suppress(BlockError):  # the controller refuses the whole line
         for letter, number in split_words(text):

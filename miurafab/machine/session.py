@@ -33,6 +33,7 @@ HOME = "$H"
 HOMING_S = 180.0
 """The longest time of homing; GRBL answers nothing meanwhile, not even a status query."""
 _RESETS = 3
+_MODES = "$G"  # answered in every state, behind the startup blocks
 _HOLD_S = 1.0  # to come to rest from full speed before the reset that ends a refused job
 _HOLD_POLL_S = 0.1  # GRBL asks for 10 queries a second at most (doc/markdown/interface.md)
 _ASK_AGAIN_S = 1.0  # a status query that noise swallowed is asked again
@@ -49,7 +50,7 @@ class Session:
     ``patience`` is the longest time between two calls of ``check``, in seconds.
     ``starts`` grows with each reset that was sent or greeted; ``restarted_itself`` is set at one
     that nobody sent, until the position is known again. ``overrides`` are as written until
-    they are told.
+    they are told. ``runs_at_start``: it has startup blocks, which run after each reset.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class Session:
         self.mm_per_unit = 1.0
         self.starts = 0
         self.restarted_itself = False
+        self.runs_at_start = False
         self._resetting = False
         self.on_data: Callable[[bytes], None] = lambda data: None
         self.patience = math.inf
@@ -220,12 +222,20 @@ class Session:
     def command(self, text: str, timeout: float = ANSWER_S) -> list[Event]:
         """Send one line, wait for its ``ok``, and return the events before it.
 
+        A controller that resets itself behind its answer, as after ``$RST=``, is waited for until
+        it has run its startup blocks.
+
         Raises :class:`~miurafab.errors.ControllerError` for ``error:``, an alarm, an unexpected
         reset, or ``timeout`` seconds without an answer.
         """
         said, refusal = self._exchange(text, timeout)
         if refusal is not None:
             raise ControllerError(f"The controller refused '{text}': {error_words(refusal)}.")
+        if self.connection.state is State.RESETTING:
+            self.forget_query()
+            if not restarts(self, RESET_S):
+                raise ControllerError(f"The controller did not start again after '{text}'.")
+            self._exchange(_MODES, timeout)
         if text.upper() == HOME:
             self.restarted_itself = False
         return said
@@ -264,6 +274,7 @@ class Session:
     def home(self, heed: Callable[[], None] = lambda: None) -> None:
         """Run the homing cycle and wait for its end; raises as :meth:`command` does.
 
+        Startup blocks run then, and a beam that they light goes out at once.
         ``heed`` is called before every read meanwhile, as ``check`` is, and may raise.
         """
         check = self._check
@@ -277,7 +288,9 @@ class Session:
             self.command(HOME, HOMING_S)
         finally:
             self._check = check
-        self.wait_status()
+        if not self.wait_status().beam_off:
+            self.command("M5")
+            self.wait_status()
 
     def _require_ready(self, text: str) -> None:
         if self.connection.may_send(SendLine(0, text.encode("ascii"))):
@@ -319,6 +332,8 @@ class Session:
                 self._reset_now(hold_first)
                 if restarts(self, RESET_S):
                     report = self.fresh_status(ANSWER_S)
+                    if self.runs_at_start and self.connection.state is not State.LOCKED:
+                        break  # a block may move or wait before it lights
                     if report is None or not report.beam_on:  # it rests: it may have missed that
                         return report is not None and report.beam_off
             self.command("M5")  # a startup block, which runs after each reset, arms the beam

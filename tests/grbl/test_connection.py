@@ -16,10 +16,9 @@ from miurafab.grbl.connection import (
     STATUS_QUERY,
     Connection,
     ProtocolMisuse,
-    dwell_seconds,
-    writes_eeprom,
 )
 from miurafab.grbl.events import Closed, Error, Event, Ok, Unknown
+from miurafab.grbl.lines import dwell_seconds, is_system, writes_eeprom, writes_setting
 from miurafab.grbl.states import State
 
 BANNER = b"\r\nGrbl 1.1h ['$' for help]\r\n"
@@ -146,6 +145,9 @@ def test_a_question_stands_for_a_missing_banner(resets: bool) -> None:
         "g10l20p1x0",
         "G90G28.1",
         "G010L2P0",
+        "/$32=0",
+        "$3/2=0",
+        "G1/0L2P1X0",
     ],
 )
 def test_a_line_that_writes_eeprom_travels_alone(text: str) -> None:
@@ -159,6 +161,19 @@ def test_a_line_that_writes_eeprom_travels_alone(text: str) -> None:
     assert not connection.may_send(line("G1X2"))
     hear(connection, b"ok\r\n")
     assert connection.may_send(line("G1X2"))
+
+
+@pytest.mark.parametrize("text", ["$32=0", "/$32=0", "$/N1=M5", "$rst=#", "$I=mine"])
+def test_what_is_stored_is_known_behind_the_sign_of_block_delete(text: str) -> None:
+    """GRBL 1.1 drops it wherever it stands, and stores the setting (gnea/grbl, ``protocol.c``)."""
+    assert is_system(text.encode())
+    assert writes_setting(text.encode())
+
+
+@pytest.mark.parametrize("text", ["$J=G91X1F600", "/$j=G91X1F600", "G10L2P1X0", "X32=0"])
+def test_a_motion_and_a_place_are_no_settings(text: str) -> None:
+    assert not is_system(text.encode())
+    assert not writes_setting(text.encode())
 
 
 @pytest.mark.parametrize("text", ["G1X10", "G28", "G30", "$$", "$I", "$N", "G100", "G0X28.1", "$H"])
@@ -175,6 +190,7 @@ def test_other_lines_do_not_write_eeprom(text: str) -> None:
         ("G1X4P3", 0),
         ("G4", 0),
         ("G40P1", 0),
+        ("/G4P/2", 2.0),
         ("G4P-2", 0),  # refused, and no time comes off what is waited for the others
         ("G4P.", 0),
         ("G4P1.5.2", 1.5),

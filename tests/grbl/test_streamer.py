@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from miurafab.errors import ControllerError, GcodeError
 from miurafab.gcode.job import Job, SendLine
-from miurafab.grbl.connection import Connection, writes_eeprom
+from miurafab.grbl.connection import Connection
+from miurafab.grbl.lines import writes_eeprom
 from miurafab.grbl.streamer import LineRefused, Streamer
 
 BANNER = b"\r\nGrbl 1.1h ['$' for help]\r\n"

@@ -21,6 +21,7 @@ from miurafab.machine.progress import Progress
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
 from miurafab.profiles import load_machine
+from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.faults import parse_faults
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
@@ -392,6 +393,30 @@ def test_a_resume_is_sent_again_only_if_it_came_too_early(
     deliver(plan_job(job, MACHINE), wire, StopSignals(), keys=wire)
     assert wire.script == []
     assert wire.commands.count(b"~") == resumes
+
+
+def test_a_key_that_changes_the_power_of_m3_waits_until_the_axes_move() -> None:
+    """In a dwell GRBL would light the beam, which the motion mode keeps dark (``protocol.c``)."""
+    job = Job("dwell.nc", "M3 S500\nG0 X5\nG4 P3\nG1 X40 F600\nG0 X0\nM5\n")
+    wire = new_wire()
+    keys = Pressed(wire, 2.0, "]")
+    plan = plan_job(job, MACHINE, SendOptions(allow_m3=True))
+    deliver(plan, wire, StopSignals(), keys=keys)
+    (at,) = [at for at, data in wire.written if data == b"\x9a"]
+    assert at > 3.0
+    assert standing_seconds(wire.device.beam_log) == 0.0
+    assert max(segment.power for segment in wire.device.beam_log) == pytest.approx(0.55, abs=0.01)
+
+
+class Pressed:
+    """A key, pressed once when so many seconds have passed."""
+
+    def __init__(self, wire: FakeWire, at: float, key: str) -> None:
+        self.wire, self.at, self.key = wire, at, key
+
+    def pressed(self) -> str:
+        key, self.key = (self.key, "") if self.wire.now() > self.at else ("", self.key)
+        return key
 
 
 # What is sent and told

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from session_walk import MACHINE
+from session_walk import HOMING, MACHINE
 from wires import FakeWire
 
-from miurafab.errors import GcodeError
+from miurafab.errors import GcodeError, MiurafabError
+from miurafab.gcode.job import Job
 from miurafab.machine.known_controller import PortSetup
 from miurafab.machine.machine_session import MachineSession
+from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.resting_beam import resting_power
 from miurafab.machine.signals import StopSignals
+from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
 
-def here(laser_mode: bool) -> tuple[MachineSession, FakeWire]:
-    values = virtual_settings(MACHINE) | {32: float(laser_mode)}
+def here(laser_mode: bool, **more: float) -> tuple[MachineSession, FakeWire]:
+    values = (
+        virtual_settings(MACHINE)
+        | {32: float(laser_mode)}
+        | {int(n[1:]): v for n, v in more.items()}
+    )
     wire = FakeWire(VirtualGrbl(values, baud=115_200))
     session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
     session.open()
@@ -69,7 +78,7 @@ def test_the_weakest_beam_is_asked_for_twice_with_what_ends_it() -> None:
     assert not wire.device.beam_on
 
 
-@pytest.mark.parametrize("line", ["$$", "$X", "$N"])
+@pytest.mark.parametrize("line", ["$$", "$X", "$N", "$32=1", "$132=0", "$I", "$C", "$SLP"])
 def test_what_is_no_program_is_sent_whatever_is_armed(line: str) -> None:
     """The laser mode is left with the beam armed, dark until the next line of a program."""
     session, wire = here(laser_mode=True)
@@ -157,4 +166,209 @@ def test_a_startup_block_has_run_when_it_is_answered() -> None:
     assert is_sent(session, wire, "$N0=G1X30F600M3")
     assert wire.device.position[0] == pytest.approx(30.0)
     assert not is_sent(session, wire, "S900")
+    assert not wire.device.beam_on
+
+
+# What is no program, and lights the beam
+
+
+@pytest.mark.parametrize("line", ["$32=0", "/$32=0", "$32.9=0.9", "$3/2=256", "$+32=-0"])
+def test_the_end_of_laser_mode_is_held_back_where_a_startup_block_would_burn(line: str) -> None:
+    session, wire = here(laser_mode=True)
+    assert is_sent(session, wire, "$N0=M3S500")
+    with pytest.raises(GcodeError, match=r"and the next reset .* S500, .*\(\$32=0\).* again after"):
+        session.say(line)
+    assert wire.device.settings[32] == 1
+    assert is_sent(session, wire, line)
+    assert wire.device.settings[32] == 0
+    wire.device.power_cycle()
+    wire.device.advance(1.0)
+    assert wire.device.beam_on
+
+
+@pytest.mark.parametrize("before", [["$N0=M5S500"], [], ["$N0=M3S500", "$N1=M5"]])
+def test_the_end_of_laser_mode_is_sent_where_no_startup_block_would_burn(before: list[str]) -> None:
+    session, wire = here(laser_mode=True)
+    assert all(is_sent(session, wire, line) for line in [*before, "$32=0"])
+    assert wire.device.settings[32] == 0
+    wire.device.power_cycle()
+    wire.device.advance(1.0)
+    assert not wire.device.beam_on
+
+
+def test_what_sets_a_laser_mode_that_is_already_off_is_sent() -> None:
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "$N0=M3S500")
+    assert is_sent(session, wire, "$N0=M3S500")
+    assert is_sent(session, wire, "$32=0")
+
+
+@pytest.mark.parametrize(
+    ("laser_mode", "line", "lights"),
+    [
+        (True, "$RST=$", True),
+        (True, "$RST=#", False),
+        (True, "$RST=*", False),
+        (False, "$RST=#", True),
+        (False, "$RST=*", False),
+    ],
+)
+def test_a_line_that_ends_in_a_reset_is_held_back_where_its_startup_blocks_burn(
+    laser_mode: bool, line: str, lights: bool
+) -> None:
+    """GRBL's own laser mode is off, and ``$RST=*`` clears the blocks."""
+    session, wire = here(laser_mode)
+    assert is_sent(session, wire, "$N0=M3S500") == laser_mode
+    if not laser_mode:
+        session.say("$N0=M3S500")
+        session.say("M5")
+    assert is_sent(session, wire, line) != lights
+    if lights:
+        session.say(line)
+    assert session.state.beam_on == wire.device.beam_on == lights
+    assert session.close()
+    wire.device.advance(5.0)
+    assert not wire.device.beam_on
+
+
+def test_the_end_of_the_check_mode_is_held_back_where_its_reset_would_burn() -> None:
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "$N0=M3S500")
+    assert is_sent(session, wire, "$N0=M3S500")
+    session.say("M5")
+    assert is_sent(session, wire, "$C")
+    assert not is_sent(session, wire, "$C")
+    assert is_sent(session, wire, "$C")
+    assert session.state.beam_on
+    assert wire.device.beam_on
+    assert session.close()
+    assert not wire.device.beam_on
+
+
+def test_homing_is_held_back_where_a_startup_block_burns_with_what_was_typed() -> None:
+    session, wire = here(laser_mode=False, **{f"_{n}": value for n, value in HOMING.items()})
+    session.unlock()
+    assert all(is_sent(session, wire, line) for line in ["$N0=M3", "M5", "S500"])
+    with pytest.raises(
+        GcodeError, match=r"After \$H the beam would be on, with S500, .* or a reset"
+    ):
+        session.say("$H")
+    assert is_sent(session, wire, "$H")
+    assert wire.device.beam_on
+    assert session.close()
+    assert not wire.device.beam_on
+
+
+@pytest.mark.parametrize("laser_mode", [False, True])
+def test_the_key_of_homing_leaves_no_beam_on(laser_mode: bool) -> None:
+    """It asks for nothing twice: what the startup block lights goes out at once."""
+    session, wire = here(laser_mode, **{f"_{n}": value for n, value in HOMING.items()})
+    session.unlock()
+    block = "$N0=G1F100M3" if laser_mode else "$N0=M3"
+    assert all(is_sent(session, wire, line) for line in [block, "M5", "S500"])
+    assert session.home().idle
+    assert not wire.device.beam_on
+    assert sum(s.t1 - s.t0 for s in wire.device.beam_log if s.standing) < 0.1
+    assert "M5" in session.state.modes
+
+
+@pytest.mark.parametrize(
+    ("laser_mode", "armed", "lights"),
+    [(True, "M3S500", True), (True, "M4S500", False), (False, "", False), (True, "M5S500", False)],
+)
+def test_a_jog_with_an_armed_beam_that_stays_on_behind_it_is_held_back(
+    laser_mode: bool, armed: str, lights: bool
+) -> None:
+    session, wire = here(laser_mode)
+    if armed:
+        session.say(armed)
+    assert is_sent(session, wire, "$J=G91X5F600") != lights
+    if lights:
+        session.say("$J=G91X5F600")
+    wire.device.advance(3.0)
+    assert wire.device.beam_on == lights
+    assert session.close()
+    assert not wire.device.beam_on
+
+
+@pytest.mark.parametrize("order", [b"\x99", b"\x9a", b"\x9b", b"\x9c", b"\x9d"])
+@pytest.mark.parametrize(("laser_mode", "armed"), [(True, "M3S500"), (False, "M4S500")])
+def test_a_power_override_lights_no_armed_beam_at_rest(
+    laser_mode: bool, armed: str, order: bytes
+) -> None:
+    """GRBL then sets the beam by spindle and S alone, whatever keeps it dark (``protocol.c``)."""
+    session, wire = here(laser_mode=True)
+    session.say("$J=G91X9F600")
+    session.realtime(b"\x9a")  # it moves
+    session.settle()
+    assert session.state.overrides.power == 110
+    said: list[str] = []
+    session.lines.on_line = said.append
+    session.realtime(b"\x9b")  # nothing is armed
+    session.realtime(b"\x9a")
+    session.watch(0.3)
+    assert said == []
+    session.say(armed)
+    if not laser_mode:
+        session.say("$32=0")
+    said.clear()
+    sent = wire.commands
+    session.realtime(order)
+    session.watch(0.3)
+    assert said == ["At rest a change of the power would light the armed beam."]
+    assert wire.commands == sent
+    assert not wire.device.beam_on
+
+
+def test_a_job_begins_dark_whatever_override_was_left_with_an_armed_beam() -> None:
+    session, wire = here(laser_mode=True)
+    session.say("$J=G91X9F600")
+    session.realtime(b"\x9a")
+    session.settle()
+    session.say("M3S500")
+    plan = plan_job(Job("a.nc", "M4 S0\nG1 X20 S500 F3000\nM5\n"), MACHINE)
+    assert session.cut(plan).lines == 3
+    assert standing_seconds(wire.device.beam_log) == 0.0
+
+
+@pytest.mark.parametrize("text", ["M4 S0\nG0 X9\nM5\n", "G0 X500\n"])
+def test_a_beam_that_rests_before_a_job_goes_out_with_the_refusal(text: str) -> None:
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "M3S500")
+    assert is_sent(session, wire, "M3S500")
+    plan = plan_job(Job("a.nc", text), MACHINE, SendOptions(force=frozenset({"bounds"})))
+    with pytest.raises(MiurafabError, match=r"beam on before .* and reports the beam off\."):
+        session.cut(plan)
+    assert not wire.device.beam_on
+    assert session.close()
+
+
+def test_a_beam_that_rests_while_a_job_cannot_begin_goes_out_at_the_close(tmp_path: Path) -> None:
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "M3S500")
+    assert is_sent(session, wire, "M3S500")
+    plan = plan_job(Job("a.nc", "G0 X9\n"), MACHINE)
+    with pytest.raises(MiurafabError, match="journal"):
+        session.cut(plan, journal_path=tmp_path)
+    assert wire.device.beam_on
+    assert session.close()
+    assert not wire.device.beam_on
+
+
+@pytest.mark.parametrize("block", ["M3S500", "G4P2M3S500"])
+def test_a_beam_that_a_start_lights_is_put_out_when_the_port_is_left(block: str) -> None:
+    """The opening of the port resets most boards; a block may wait before it burns."""
+    session, wire = here(laser_mode=False)
+    session.say("$N0=G4P2" if "G4" in block else "$N0=")
+    for _ in range(2):
+        is_sent(session, wire, "$N1=M3S500")
+    assert session.close()
+    assert not wire.device.beam_on
+    wire.device.advance(5.0)
+    assert not wire.device.beam_on
+    wire.device.power_cycle()
+    again = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    again.open()
+    assert again.close()
+    wire.device.advance(5.0)
     assert not wire.device.beam_on

@@ -289,7 +289,7 @@ def test_a_second_press_does_not_end_a_stop_that_the_controller_has_not_heard() 
 TYPED = st.sampled_from(
     ["M3 S500", "M3", "M4", "M4S20", "M5", "S300", "S0", "S9", "G1 X1 F6000", "G0 X0", "G80",
      "G1 F6000 S40", "G0 M3 S5", "G1 X2 F6000 M3 S60", "(M3) S7", "$32=0", "$32=1", "M30",
-     "$N0=M3S30", "$N1=G1F600M3"]
+     "$N0=M3S30", "$N1=G1F600M3", "$RST=$", "$J=G91X1F6000", "reset", "]"]
 )  # fmt: skip
 
 
@@ -304,12 +304,14 @@ def test_no_line_of_a_person_lights_a_resting_beam_unless_it_is_sent_twice(
     for line in lines:
         sent = wire.sent
         try:
-            here.say(line)
-        except GcodeError:
+            here.realtime(b"\x9a") if line == "]" else here.say(line)
+        except GcodeError as held:
             assert wire.sent.replace(sent, b"").strip() in (b"", b"$G")  # it was not sent
             here.say(line)
             rest(here)
-            assert wire.device.beam_on, line  # and would indeed have done that
+            # And would indeed have done that, but for what was armed in laser mode.
+            later = "the next reset" in str(held) or "$32=0" in lines
+            assert wire.device.beam_on or later, line
             wanted = True
         rest(here)
         wanted &= wire.device.beam_on
