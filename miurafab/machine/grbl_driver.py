@@ -10,8 +10,10 @@ controller's queue behind up to seconds of burning.
 
 from __future__ import annotations
 
+import math
 import re
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from miurafab.errors import ControllerError, MiurafabError, PersonNeeded
 from miurafab.findings import Finding
 from miurafab.gcode.program import BEAM_M3, PAUSE, Program
 from miurafab.grbl.events import Error, Event, Ok, StatusReport
+from miurafab.grbl.lines import dwell_seconds
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S, RESTARTED
 from miurafab.machine.judge_words import leaves_air_on
@@ -46,7 +49,11 @@ _OTHER_PLACES = re.compile(r"G\s*0*(?:10|28|30|38|43|5[3-9]|9[12])", re.IGNORECA
 
 _DONE = ("Idle", "Check")
 """The states of a controller that does nothing, in a job that burns and in check mode."""
-_NEAR_MM = 0.1  # more than a step of a motor
+_STOPPED = ("Hold", "Door", "Tool")
+"""The states that last until somebody ends them; grblHAL changes its tool in the last."""
+_HELD_S = 600.0
+"""The longest stop that nobody at the keys can end."""
+_NEAR_MM = 0.1  # or a step of the motor, if that is longer
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # between status queries while the last moves are made
 
@@ -70,6 +77,7 @@ class GrblDriver(StreamDriver):
         self._doubtful_reports = 0  # that may tell whether a resume was heard
         self._listened = 0.0  # seconds; what shows the progress may take longer than a patience
         self._idle_at: float | None = None  # of these, when it began to idle and owe an answer
+        self._stopped_at: float | None = None  # ... and when it stopped in mid-job
 
     @property
     def acknowledged(self) -> int:
@@ -152,8 +160,10 @@ class GrblDriver(StreamDriver):
                 streamer.take(event)
                 if isinstance(event, StatusReport):
                     self._resume_a_late_hold(event)
+                    waits = self._attend_pause(event)
+                    self._watch_a_stop(event, waits is not None)
                     self.tell(
-                        self._attend_pause(event) or event.state,
+                        waits or event.state,
                         session.position,
                         session.connection.in_flight_bytes,
                         session.overrides,
@@ -176,8 +186,7 @@ class GrblDriver(StreamDriver):
         if program is None or not owed or not _rests(report) or self.held:
             return None
         line = owed[0].number  # GRBL answers M0 when its hold is over, and all before it earlier
-        pauses = np.flatnonzero((program.event_line == line) & (program.event_kind == PAUSE))
-        if not len(pauses) or not self._has_come_to(program, program.event_move[pauses[0]]):
+        if self._is_at_pause(program, line) is False:
             return None
         where = f"{self.plan.job.name}, line {line}"
         if self.plan.at_pause == "stop":
@@ -189,21 +198,64 @@ class GrblDriver(StreamDriver):
             self.orders.append(RESUME)
         return f"waiting at {where} (M0): r goes on"
 
-    def _has_come_to(self, program: Program, moves: int) -> bool:
-        """Whether the head may stand where the first ``moves`` of ``program`` end: a hold of
-        somebody at the machine stops it before. An axis that each line leaves where the job began
-        (an arc may leave it on the way) tells nothing, nor does a job that names places otherwise
-        than in its own coordinates.
+    def _is_at_pause(self, program: Program, line: int) -> bool | None:
+        """Whether the head stands where the pause of ``line`` comes: a hold of somebody at the
+        machine stops it before. None where nothing tells that: an axis that each line leaves where
+        the job began (an arc may leave it on the way), a job that names places otherwise than in
+        its own coordinates.
         """
-        position = self._session.position
-        if position is None or self._names_other_places:
-            return True
+        pauses = np.flatnonzero((program.event_line == line) & (program.event_kind == PAUSE))
+        if not len(pauses):
+            return False
+        position, moves = self._session.position, program.event_move[pauses[0]]
         ends = program.end[:moves][np.diff(program.line[:moves], append=0) != 0]
-        return all(
-            abs(ends[-1, axis] - at) < _NEAR_MM
-            for axis, at in enumerate(position[:3])
-            if ends[:, axis].any()
-        )
+        axes = [axis for axis, _ in enumerate((position or ())[:3]) if ends[:, axis].any()]
+        if position is None or not axes or self._names_other_places:
+            return None
+        return all(abs(ends[-1, axis] - position[axis]) < self._near_mm(axis) for axis in axes)
+
+    def _near_mm(self, axis: int) -> float:
+        """How near to a place the controller comes that is told to go there."""
+        return max(_NEAR_MM, 1.0 / (self._known.settings.values.get(100 + axis) or math.inf))
+
+    def _watch_a_stop(self, report: StatusReport, pauses: bool) -> None:
+        """Raise where a stop in mid-job would never end: the program ``pauses`` at a line before
+        which answers are owed, or nobody is there to end it.
+        """
+        if report.state not in _STOPPED or pauses or self.held:
+            self._stopped_at = None
+            return
+        if self._stopped_at is None:
+            self._stopped_at = self._listened
+        stopped, name = self._listened - self._stopped_at, self.plan.job.name
+        patience = ANSWER_S + self._streamer.dwell_in_flight
+        late = self._late_pause() if _rests(report) and stopped > patience else None
+        if late is not None:
+            first = self._session.connection.in_flight[0].number
+            raise ControllerError(
+                f"The controller waits at line {late} of {name} (M0) but has not answered line "
+                f"{first} before it for {patience:g} s: bytes were lost on the way, so look at the "
+                "cable and the baud rate."
+            )
+        if stopped > _HELD_S and self.plan.at_pause != "wait":
+            raise PersonNeeded(
+                f"{name} was stopped at the machine ({report.state}) for {_HELD_S / 60:g} minutes "
+                f"{self._streamer.where}, and nobody is at the keys; `resume` the job in a terminal"
+            )
+
+    def _late_pause(self) -> int | None:
+        """The line behind the first that is owed at whose pause the head stands, if there is one;
+        GRBL has answered all lines before it, then. A hold in a dwell stands there, too.
+        """
+        program = self.plan.program
+        if program is None:
+            return None
+        for before, line in pairwise(self._session.connection.in_flight):
+            if dwell_seconds(before.data):
+                return None
+            if self._is_at_pause(program, line.number):
+                return line.number
+        return None
 
     @cached_property
     def _names_other_places(self) -> bool:

@@ -526,3 +526,90 @@ def test_an_abort_holds_first_where_no_beam_can_stand(machine: str, text: str, e
     with pytest.raises(JobStopped, match="stopped at the keyboard"):
         deliver(plan, wire, StopSignals(), keys=Abort(wire))
     assert wire.commands.rpartition(b"\n")[2] == end
+
+
+# What would never end
+
+
+class Losing(FakeWire):
+    """Loses the answers of so many lines, from the first on that has gone out behind ``since``."""
+
+    since, count = b"", 0
+
+    def read(self, timeout: float) -> bytes:
+        said = super().read(timeout)
+        while self.count and b"ok\r\n" in said and self.since in self.commands:
+            said, self.count = said.replace(b"ok\r\n", b"", 1), self.count - 1
+        return said
+
+
+def losing(since: bytes, count: int, values: dict[int, float] | None = None) -> Losing:
+    wire = Losing(VirtualGrbl(virtual_settings(MACHINE) | (values or {}), baud=115_200))
+    wire.since, wire.count = since, count
+    within_a_minute(wire)
+    return wire
+
+
+@pytest.mark.parametrize("at_pause", ["go on", "stop", "wait"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_answers_that_are_lost_before_a_pause_end_the_job(at_pause: str, count: int) -> None:
+    """The controller holds at the M0, and the line that is owed is none: that lasted for ever."""
+    job = Job("paused.nc", "M4 S0\nG1 X20 S500 F3000\nG0 X25\nM8\nM0\nG1 X30\nM5\n")
+    wire = losing(b"G1X20", count)
+    plan = replace(plan_job(job, MACHINE), at_pause=at_pause)
+    with pytest.raises(
+        ControllerError, match=r"waits at line 5 of paused\.nc \(M0\) but has not answered line \d "
+    ) as caught:
+        deliver(plan, wire, StopSignals())
+    assert str(caught.value).endswith("reset and reports the beam off.")
+    wire.settle()
+    assert burnt(wire) == pytest.approx(20, abs=0.2)
+
+
+def test_a_lost_answer_of_a_pause_ends_the_job_at_the_next() -> None:
+    job = Job("paused.nc", "M4 S0\nG1 X20 S500 F3000\nM0\nG0 X25\nM0\nG1 X30\nM5\n")
+    wire = losing(b"~", 1)
+    with pytest.raises(ControllerError, match=r"waits at line 5 .* not answered line [34] "):
+        deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
+
+
+def test_a_hold_in_a_dwell_before_a_pause_is_no_loss() -> None:
+    job = Job("paused.nc", "M4 S0\nG1 X20 S500 F3000\nG4 P4\nM0\nG1 X30\nM5\n")
+    wire = new_wire()
+    pressed_at_the_machine(wire, (2.0, b"!"), (22.0, b"~"))
+    deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
+    assert wire.commands.count(b"~") == 1
+    assert burnt(wire) == pytest.approx(30, abs=0.2)
+
+
+@pytest.mark.parametrize(("at_pause", "order"), [("go on", b"!"), ("stop", b"\x84")])
+def test_a_stop_that_nobody_ends_ends_the_job_after_ten_minutes(
+    at_pause: str, order: bytes
+) -> None:
+    """A digit 1 with one bit changed is a feed hold, too."""
+    job = Job("held.nc", "M4 S0\nG1 X20 S500 F300\nM5\n")
+    wire = new_wire()
+    pressed_at_the_machine(wire, (2.0, order))
+    with pytest.raises(PersonNeeded, match=r"held\.nc was stopped at the machine \((Hold|Door)\)"):
+        deliver(replace(plan_job(job, MACHINE), at_pause=at_pause), wire, StopSignals())
+    assert 600 < wire.now() < 610
+    assert b"\x18" in wire.commands
+    assert not wire.device.beam_on
+
+
+def test_who_is_at_the_keys_may_hold_as_long_as_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("miurafab.machine.grbl_driver._HELD_S", 10.0)
+    job = Job("held.nc", "M4 S0\nG1 X20 S500 F300\nM5\n")
+    wire = new_wire()
+    pressed_at_the_machine(wire, (2.0, b"!"), (30.0, b"~"))
+    deliver(replace(plan_job(job, MACHINE), at_pause="wait"), wire, StopSignals())
+    assert wire.now() > 30
+
+
+def test_a_pause_is_known_on_a_machine_of_few_steps() -> None:
+    """Of 2 steps a mm it comes to X20.5 or X20 where the program says X20.2."""
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE) | {100: 2.0, 101: 2.0}, baud=115_200))
+    within_a_minute(wire)
+    job = Job("paused.nc", "M4 S0\nG1 X20.2 Y7.3 S500 F600\nM0\nG1 X30\nM5\n")
+    deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
+    assert wire.commands.count(b"~") == 1
