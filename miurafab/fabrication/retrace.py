@@ -222,10 +222,10 @@ def _seam_faults(
     layout: Layout, pattern: CreasePattern, outlined: OutlinedPatches
 ) -> Iterator[str]:
     """Seams without a tab of which the layout says nothing."""
-    seams = all_seams(pattern, outlined.face_patch).edges
-    told = {frozenset(pair) for pair in outlined.tabs.seams.edges.tolist()}
-    bare = {edge for pair in seams.tolist() if frozenset(pair) not in told for edge in pair}
-    missing = [p for p in seams.tolist() if set(p) <= bare and not set(p) & set(layout.untabbed)]
+    seams = all_seams(pattern, outlined.face_patch).edges.tolist()
+    tabbed = {frozenset(pair) for pair in outlined.tabs.seams.edges.tolist()}
+    told = set(layout.untabbed)
+    missing = [pair for pair in seams if frozenset(pair) not in tabbed and told.isdisjoint(pair)]
     if missing:
         count = (
             f"{len(missing)} seam edge has"
