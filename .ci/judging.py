@@ -24,7 +24,7 @@ import tempfile
 import threading
 import time
 import traceback
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -51,7 +51,7 @@ class Ordered:
     """
 
     def __init__(self, order: list[str], seconds: dict[str, float]) -> None:
-        self.order = order
+        self.order, self.failing = order, ""
         self.seconds, self.slowest = seconds, max(seconds.values())
 
     def pytest_runtest_logstart(self, nodeid):
@@ -73,25 +73,30 @@ class Ordered:
         for item, following in itertools.pairwise([*chosen, None]):
             if session.testsfailed:
                 break
+            self.failing = item.nodeid
             item.ihook.pytest_runtest_protocol(item=item, nextitem=following)
         return True
 
 
 class Host(Ordered):
-    """Runs the tests on one fault after another, each in a fork, when they are collected."""
+    """Runs the tests on one fault after another, each in a fork, when they are collected; tests
+    that saw most faults before come first.
+    """
 
     def __init__(self, faults: list[dict], known: dict) -> None:
         super().__init__([], known["seconds"])
         self.faults, self.known = faults, known
         self.ends: list[tuple[str, float]] = []
+        self.seen: Counter[str] = Counter()
 
     def pytest_runtestloop(self, session):
         functions = loaded({fault["module"] for fault in self.faults})
         for fault in self.faults:
             was, becomes = exchange(fault)
             lines = {(fault["module"], line) for line in lines_of(was)}
-            order = order_of(fault, self.known)
-            self.order = [name for name in order if not lines.isdisjoint(self.known["lines"][name])]
+            ran = self.known["lines"]
+            order = [n for n in order_of(fault, self.known) if not lines.isdisjoint(ran[n])]
+            self.order = sorted(order, key=lambda name: -self.seen[name])
 
             def work(was=was, becomes=becomes):
                 for function in functions[place_of(was)]:
@@ -99,10 +104,12 @@ class Host(Ordered):
                 try:
                     super(Host, self).pytest_runtestloop(session)
                 except KeyboardInterrupt:  # a test that is stopped has not passed
-                    return 1, None
-                return int(session.testsfailed > 0), None
+                    return 1, self.failing
+                return int(session.testsfailed > 0), self.failing
 
-            self.ends.append(end_of(work, self.order, self.known))
+            how, took, failing = end_of(work, self.order, self.known)
+            self.ends.append((how, took))
+            self.seen[failing] += how == "killed"
         return True
 
 
@@ -268,9 +275,9 @@ def order_of(fault: dict, known: dict) -> list[str]:
     return sorted(seconds, key=place)
 
 
-def end_of(work, tests: list[str], known: dict) -> tuple[str, float]:
-    """What became of a fault if ``work()`` runs ``tests`` on it in a child, and the seconds of
-    processor time it took.
+def end_of(work, tests: list[str], known: dict) -> tuple[str, float, object]:
+    """What became of a fault if ``work()`` runs ``tests`` on it in a child, the seconds of
+    processor time it took, and what it answers.
     """
     begun = resource.getrusage(resource.RUSAGE_CHILDREN)
     status, answer = in_child(work, 20 + 10 * sum(known["seconds"][name] for name in tests))
@@ -278,7 +285,7 @@ def end_of(work, tests: list[str], known: dict) -> tuple[str, float]:
     if status not in ENDS:
         raise RuntimeError(f"The tests ended with {status}: {answer}")
     took = ended.ru_utime + ended.ru_stime - begun.ru_utime - begun.ru_stime
-    return ENDS[status], took
+    return ENDS[status], took, answer
 
 
 def judged_together(faults: list[dict], area: dict, known: dict) -> list[tuple[str, float]]:
@@ -308,7 +315,7 @@ def judged_alone(faults: list[dict], area: dict, known: dict) -> list[tuple[str,
             files = list(dict.fromkeys(name.partition("::")[0] for name in part))
             return run_tests(files, Ordered(part, known["seconds"])), None
 
-        how, seconds = end_of(work, part, known)
+        how, seconds, _ = end_of(work, part, known)
         took += seconds
         if how != "survived":
             break
