@@ -345,15 +345,19 @@ class Scripted(FakeWire):
         super().__init__(new_wire().device)
         self.script, self.late, self.kept = list(script), late, b""
 
+    @property
+    def keys_are_next(self) -> bool:
+        return self.script != [] and set(self.script[0]) <= set(" r-")
+
     def pressed(self) -> str:
-        due = self.now() > 4.0 and self.script and self.script[0] in (" ", "r", " r", "  ")
-        return self.script.pop(0) if due and (self.kept or not self.late) else ""
+        due = self.now() > 4.0 and self.keys_are_next and (self.kept or not self.late)
+        return self.script.pop(0) if due else ""
 
     def read(self, timeout: float) -> bytes:
         said, self.kept = self.kept + super().read(timeout), b""
         if self.now() < 4.0 or b"<" not in said or not self.script:
             return said
-        if self.script[0].strip(" r") == "":
+        if self.keys_are_next:
             self.kept = said
             return b""
         states = self.script.pop(0).split()
@@ -365,6 +369,7 @@ class Scripted(FakeWire):
     [
         ((" r", "Hold:1", "Hold:0"), False, 2),
         ((" r", "Hold:0 Hold:0"), False, 2),
+        ((" -r", "Hold:1", "Hold:0"), False, 2),
         ((" r", "Run", "Hold:0"), False, 1),
         ((" r", "Run", "Hold:0"), True, 2),
         ((" r", "Run", "Run", "Hold:0"), True, 1),
@@ -375,6 +380,7 @@ class Scripted(FakeWire):
     ids=[
         "forgotten",
         "told twice",
+        "slower meanwhile",
         "heard",
         "told of before",
         "told of before, and heard",
