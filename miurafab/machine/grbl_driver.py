@@ -76,7 +76,7 @@ class GrblDriver(StreamDriver):
         self.refusals = self._streamer.refusals
         self._doubtful_reports = 0  # that may tell whether a resume was heard
         self._listened = 0.0  # seconds; what shows the progress may take longer than a patience
-        self._idle_at: float | None = None  # of these, when it began to idle and owe an answer
+        self._heard_at = 0.0  # of these, when it last answered or was busy
         self._stopped_at: float | None = None  # ... and when it stopped in mid-job
 
     @property
@@ -307,14 +307,10 @@ class GrblDriver(StreamDriver):
         owed = self._session.connection.in_flight
         reports = [event for event in events if isinstance(event, StatusReport)]
         busy = any(report.state not in _DONE for report in reports)
-        if busy or not owed or any(isinstance(event, Ok | Error) for event in events):
-            self._idle_at = None
-        if not owed or not reports or reports[-1].state not in _DONE:
-            return
-        if self._idle_at is None:
-            self._idle_at = self._listened
+        if busy or any(isinstance(event, Ok | Error) for event in events):
+            self._heard_at = self._listened
         patience = ANSWER_S + self._streamer.dwell_in_flight
-        if self._listened - self._idle_at > patience:
+        if owed and reports and self._listened - self._heard_at > patience:
             raise ControllerError(
                 f"The controller is idle but has not answered line {owed[0].number} of "
                 f"{self.plan.job.name} for {patience:g} s: bytes were lost on the way, so look at "
