@@ -112,6 +112,9 @@ class Host(Ordered):
             self.seen[failing] += how == "killed"
         return True
 
+    def pytest_internalerror(self, excrepr):
+        self.ends = [(str(excrepr), 0.0)]
+
 
 class Watched:
     """Which lines of the modules each test runs, and how long the test takes; and which functions

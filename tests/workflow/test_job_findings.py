@@ -13,6 +13,7 @@ from test_forged_jobs import KINDS, made
 
 import miurafab as mf
 from miurafab.errors import LayoutError
+from miurafab.workflow.whole_folder import ORDER, STAGING
 
 
 @pytest.fixture
@@ -46,6 +47,17 @@ def test_a_whole_job_is_reported_with_its_counts(job: Path) -> None:
     }
     assert [each["code"] for each in report["findings"]] == ["no-target"]
     assert found.path == job
+
+
+def test_a_job_that_a_process_left_half_written_is_finished_first(job: Path) -> None:
+    staging, names = job / STAGING, ["manifest.json", "layout.json"]
+    staging.mkdir()
+    for name in names:
+        (job / name).rename(staging / name)
+    order = {"first": [], "remove": [], "put": names}
+    (staging / ORDER).write_text(json.dumps(order))
+    assert places(mf.check_job(job)) == []
+    assert not staging.exists()
 
 
 def test_of_a_job_that_lacks_a_file_nothing_is_traced(job: Path) -> None:
