@@ -157,7 +157,7 @@ def _traced(
     pattern = read_fold(folder / pattern_name(folder, manifest))
     yield from check(pattern).findings
     material = job_material(layout.material, folder)
-    options = read_options(LayoutOptions, manifest.options, where=MANIFEST, folder=folder)
+    options = read_options(LayoutOptions, manifest.options, where=MANIFEST)
     try:
         passes, faults = retraced(layout, pattern, machine, material, options)
     except LayoutError as fault:
@@ -165,6 +165,6 @@ def _traced(
         return
     for sentence in faults:
         yield Finding("layout", sentence, LAYOUT)
-    tab_edges = np.array([t.edge for p in layout.patches for t in p.tabs], dtype=np.int64)
+    tab_edges = np.array([tab.edge for patch in layout.patches for tab in patch.tabs])
     for strokes, program in zip(passes, programs, strict=True):
         yield from traced_strokes(strokes, pattern, tab_edges, program, machine, material, traced)

@@ -399,6 +399,11 @@ def test_a_manifest_that_does_not_name_the_pattern_of_the_layout_is_refused(job:
         rewritten(job, files=files)
 
 
+def test_an_option_that_is_none_is_named_with_the_manifest(job: Path) -> None:
+    with pytest.raises(InputError, match=r"manifest\.json.*max_patches"):
+        rewritten(job, options={"max_patches": "30x60"})
+
+
 @pytest.mark.parametrize("schema", ["miurafab-job/2", "", None])
 def test_another_schema_is_refused_by_its_name(job: Path, schema: str | None) -> None:
     with pytest.raises(InputError, match=r"has the schema .*; this version reads 'miurafab-job/1'"):
