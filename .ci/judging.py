@@ -28,7 +28,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-from placing import ROOT, Faulty, Held, Place, exchange, faulty, lines_of, loaded, place_of
+from placing import ROOT, Faulty, Held, Place, exchange, faulty, lines_of, loaded, name_of, place_of
 
 OPTIONS = ("-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--no-header", "--tb=no")
 PLAIN = ("--assert=plain",)
@@ -121,7 +121,8 @@ class Watched:
     run before the first test.
     """
 
-    def __init__(self, modules: set[str]) -> None:
+    def __init__(self, modules: list[str]) -> None:
+        self.names = [name_of(path) for path in modules]
         self.modules = {str(ROOT / path) for path in modules}
         self.seconds: dict[str, float] = {}
         self.lines: dict[str, list[tuple[str, int]]] = {}
@@ -149,6 +150,11 @@ class Watched:
             return line
 
         return line(frame, event, None)
+
+    def pytest_collection_finish(self):
+        """Loads what a test would load later."""
+        for name in self.names:
+            importlib.import_module(name)
 
     def pytest_runtest_logreport(self, report):
         if report.failed:
@@ -230,7 +236,7 @@ def watched(area: dict[str, list[str]]) -> dict[str, object]:
     """What the tests of ``area`` run and take without a fault."""
 
     def work():
-        found = Watched(set(area["modules"]))
+        found = Watched(area["modules"])
         status = run_tests(area["tests"], found)
         libraries = [
             name

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import gc
+import importlib
 import importlib.abc
 import importlib.machinery
 import types
@@ -94,8 +95,10 @@ def lines_of(code: types.CodeType) -> set[int]:
     return {line for each in _within(code) for _, _, line in each.co_lines() if line is not None}
 
 
-def loaded(modules: list[str]) -> dict[Place, list[types.FunctionType]]:
+def loaded(modules: set[str]) -> dict[Place, list[types.FunctionType]]:
     """The functions of ``modules`` in this process by their places."""
+    for path in modules:
+        importlib.import_module(name_of(path))
     paths = {str(ROOT / path) for path in modules}
     gc.unfreeze()
     found = defaultdict(list)
