@@ -156,16 +156,15 @@ def _lines(patch: Patch) -> list[Floats]:
 def _tabs(patches: tuple[Patch, ...], pattern: CreasePattern, face_patch: Ints) -> TabRegions:
     """All tabs of ``patches``, patch by patch."""
     listed = [(patch, tab) for patch in patches for tab in patch.tabs]
-    edges = np.full((len(listed), 2), -1)
-    faces = np.full((len(listed), 2), -1)
-    fold = np.full(len(listed), "U")
-    sizes = np.array([len(tab.polygon_mm) for _, tab in listed], dtype=np.int64)
+    edges, faces = np.full((2, len(listed), 2), -1)
+    fold = np.empty(len(listed), "U1")
+    sizes = np.array([len(tab.polygon_mm) for _, tab in listed])
     points = np.zeros((len(listed), int(sizes.max(initial=3)), 2))
     for row, (patch, tab) in enumerate(listed):
-        owners = ((0, tab.edge, patch.id), (1, tab.mate_edge, tab.mate_patch))
-        for side, edge, owner in owners:
-            if edge is None or owner is None:
-                continue
+        sides = [(tab.edge, patch.id)]
+        if tab.mate_edge is not None and tab.mate_patch is not None:
+            sides.append((tab.mate_edge, tab.mate_patch))
+        for side, (edge, owner) in enumerate(sides):
             if not 0 <= edge < len(pattern.edges_faces):
                 raise LayoutError(f"Tab {tab.label} names edge {edge}, which is not there.")
             beside = pattern.edges_faces[edge]
