@@ -53,6 +53,7 @@ _STOPPED = ("Hold", "Door", "Tool")
 """The states that last until somebody ends them; grblHAL changes its tool in the last."""
 _HELD_S = 600.0
 """The longest stop that nobody at the keys can end."""
+_LIT_HOLDS = 2  # GRBL puts the beam out a moment after it tells of the hold (protocol.c)
 _NEAR_MM = 0.1  # or a step of the motor, if that is longer
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # between status queries while the last moves are made
@@ -78,6 +79,7 @@ class GrblDriver(StreamDriver):
         self._listened = 0.0  # seconds; what shows the progress may take longer than a patience
         self._heard_at = 0.0  # of these, when it last answered or was busy
         self._stopped_at: float | None = None  # ... and when it stopped in mid-job
+        self._lit_holds = 0  # reports in a row of a hold with the beam on
 
     @property
     def acknowledged(self) -> int:
@@ -222,6 +224,12 @@ class GrblDriver(StreamDriver):
         """Raise where a stop in mid-job would never end: the program ``pauses`` at a line before
         which answers are owed, or nobody is there to end it.
         """
+        self._lit_holds = self._lit_holds + 1 if self._burns_now(report, pauses) else 0
+        if self._lit_holds > _LIT_HOLDS:
+            raise ControllerError(
+                f"{self.plan.job.name} was held {self._streamer.where}, and the controller leaves "
+                "the beam on in a hold"
+            )
         if report.state not in _STOPPED or pauses or self.held:
             self._stopped_at = None
             return
@@ -243,6 +251,14 @@ class GrblDriver(StreamDriver):
                 f"{self._streamer.where}, and nobody is at the keys; `resume` the job in a terminal"
             )
 
+    def _burns_now(self, report: StatusReport, pauses: bool) -> bool:
+        """Whether the beam is on in a hold, by the ``report``, or by the program where that does
+        not tell (GRBL 0.9).
+        """
+        if self.plan.machine.tool.kind != "laser" or not _rests(report):
+            return False
+        return report.beam_on or (self._burns_in_hold and not report.beam_off and not pauses)
+
     def _late_pause(self) -> int | None:
         """The line behind the first that is owed at whose pause the head stands, if there is one;
         GRBL has answered all lines before it, then. A hold in a dwell stands there, too.
@@ -263,7 +279,8 @@ class GrblDriver(StreamDriver):
 
     def obey(self) -> None:
         """Send ``orders``, unless the controller is deaf while it writes its EEPROM; those that
-        would light a resting beam (M3) when it moves again.
+        would light a resting beam (M3) when it moves again. Where a hold leaves the beam on, the
+        job is stopped in place of it.
         """
         session = self._session
         if not session.connection.writing_eeprom:
@@ -272,6 +289,12 @@ class GrblDriver(StreamDriver):
                 if order in POWER and self._burns_at_rest and not _moves(session.status):
                     self.orders.append(order)
                     continue
+                if order == HOLD and self._burns_in_hold:
+                    raise JobAborted(
+                        f"{self.plan.job.name} was stopped at the keyboard, not held: the "
+                        "controller leaves the beam on in a hold.",
+                        at_once=True,
+                    )
                 session.write(session.connection.send_realtime(order))
                 # GRBL forgets a resume that comes before the hold has come to rest (protocol.c).
                 if order in (HOLD, RESUME):
@@ -322,11 +345,20 @@ class GrblDriver(StreamDriver):
     def stop(self, error: MiurafabError | None) -> str:
         """See :class:`StreamDriver`."""
         session = self._session
-        if isinstance(error, JobAborted) and not (error.at_once or self._burns_at_rest):
+        lit = self._burns_at_rest or self._burns_in_hold
+        if isinstance(error, JobAborted) and not (error.at_once or lit):
             off = session.hold_and_stop()
         else:
             off = session.stop(hold_first=isinstance(error, LineRefused))
         return WAS_RESET if off else NOT_CONFIRMED
+
+    @property
+    def _burns_in_hold(self) -> bool:
+        """Whether GRBL leaves the beam on while the axes are held: without laser mode."""
+        program, machine = self.plan.program, self.plan.machine
+        off = machine.dialect == "grbl-0.9" or self._known.settings.values.get(32) == 0.0
+        burns = program is None or bool(program.beam_on.any())
+        return machine.tool.kind == "laser" and off and burns
 
     @property
     def _burns_at_rest(self) -> bool:

@@ -20,7 +20,7 @@ from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.progress import Progress
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
-from miurafab.profiles import load_machine
+from miurafab.profiles import MachineProfile, load_machine
 from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.faults import parse_faults
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
@@ -290,8 +290,7 @@ def test_a_pause_is_known_to_a_controller_that_does_not_tell_how_it_holds(at_pau
         with pytest.raises(PersonNeeded, match=r"line 5 waits for a person \(M0\)"):
             deliver(plan, wire, StopSignals())
     else:
-        pressed_at_the_machine(wire, (2.0, b"!"), (9.0, b"~"))
-        assert deliver(plan, wire, StopSignals()).seconds > 9
+        deliver(plan, wire, StopSignals())
         assert wire.commands.count(b"~") == 1
     assert burnt(wire) == pytest.approx(15, abs=0.2)
 
@@ -532,6 +531,58 @@ def test_an_abort_holds_first_where_no_beam_can_stand(machine: str, text: str, e
     with pytest.raises(JobStopped, match="stopped at the keyboard"):
         deliver(plan, wire, StopSignals(), keys=Abort(wire))
     assert wire.commands.rpartition(b"\n")[2] == end
+
+
+# Holds that burn
+
+
+FORCED = SendOptions(allow_m3=True, force=frozenset({"laser-mode"}))
+
+
+def without_laser_mode(dialect: str) -> tuple[MachineProfile, FakeWire]:
+    if dialect == "grbl-0.9":
+        machine = load_machine("grbl09-laser-300")
+        return machine, FakeWire(virtual_machine(machine))
+    return MACHINE, FakeWire(VirtualGrbl(virtual_settings(MACHINE) | {32: 0.0}, baud=115_200))
+
+
+@pytest.mark.parametrize("dialect", ["grbl-0.9", "grbl-1.1"])
+def test_a_job_that_burns_without_laser_mode_is_stopped_in_place_of_a_hold(dialect: str) -> None:
+    """GRBL leaves the spindle on in a hold, and so the beam, on one spot."""
+    machine, wire = without_laser_mode(dialect)
+    job = Job("slow.nc", "G0 X5 Y5\nM3 S0\nG1 X60 S500 F600\nM5\n")
+    with pytest.raises(JobStopped, match=r"not held: the controller leaves the beam on") as caught:
+        deliver(plan_job(job, machine, FORCED), wire, StopSignals(), keys=Pressed(wire, 3.0, " "))
+    assert re.search(
+        r"lines were acknowledged, and the controller (was reset|did not)", str(caught.value)
+    )
+    assert b"!" not in wire.commands
+    wire.settle()
+    assert not wire.device.beam_on
+    assert standing_seconds(wire.device.beam_log) < 0.03
+
+
+@pytest.mark.parametrize("dialect", ["grbl-0.9", "grbl-1.1"])
+def test_a_hold_at_the_machine_that_leaves_the_beam_on_ends_the_job(dialect: str) -> None:
+    machine, wire = without_laser_mode(dialect)
+    pressed_at_the_machine(wire, (3.0, b"!"))
+    job = Job("slow.nc", "G0 X5 Y5\nM3 S0\nG1 X60 S500 F600\nM5\n")
+    with pytest.raises(
+        ControllerError, match=r"slow\.nc was held .* leaves the beam on in a hold; "
+    ):
+        deliver(plan_job(job, machine, FORCED), wire, StopSignals())
+    assert not wire.device.beam_on
+    assert standing_seconds(wire.device.beam_log) < 1.0
+
+
+@pytest.mark.parametrize("dialect", ["grbl-0.9", "grbl-1.1"])
+def test_a_dark_job_may_be_held_without_laser_mode(dialect: str) -> None:
+    machine, wire = without_laser_mode(dialect)
+    pressed_at_the_machine(wire, (6.0, b"~"))
+    job = Job("dark.nc", "G0 X5 Y5\nG1 X60 F600\n")
+    keys = Pressed(wire, 3.0, " ")
+    assert deliver(plan_job(job, machine, FORCED), wire, StopSignals(), keys=keys).lines == 2
+    assert b"!" in wire.commands
 
 
 # What would never end
