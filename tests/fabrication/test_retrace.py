@@ -42,6 +42,20 @@ def two_trimmed() -> CreasePattern:
     return inside_circle(two_pieces(5, 5, 2), 0.45)
 
 
+def mate_first() -> CreasePattern:
+    """Two pieces, of which an edge that a tab is glued to is that of number 0."""
+    pattern = two_pieces(5, 5, 2)
+    assert pattern.seams is not None
+    order = np.argsort(np.arange(len(pattern.edges_vertices)) != pattern.seams[0, 1], kind="stable")
+    return replace(
+        pattern,
+        edges_vertices=pattern.edges_vertices[order],
+        edges_assignment=pattern.edges_assignment[order],
+        edges_fold_angle=pattern.edges_fold_angle[order],
+        seams=np.argsort(order)[pattern.seams],
+    )
+
+
 LAYOUTS: dict[str, tuple[Callable[[], CreasePattern], MachineProfile, dict[str, Any]]] = {
     "whole": (small, BED, {}),
     "glue": (small, BED, SMALL | {"tab_side": "alternate", "ticks": 2}),
@@ -56,6 +70,7 @@ LAYOUTS: dict[str, tuple[Callable[[], CreasePattern], MachineProfile, dict[str, 
     "tabs": (small, BED, SMALL | {"tab_height": 3, "tab_inset": 1, "tab_angle": 60}),
     "copies": (small, BED, SMALL | {"quantity": 2, "bridges": 2}),
     "border": (lambda: two_pieces(5, 5, 2), LARGE, {"border_tabs": "all"}),
+    "mate": (mate_first, LARGE, {}),
     "pieces": (lambda: two_pieces(5, 5, 2), LARGE, {"two_sided": True}),
     "trimmed": (two_trimmed, KNIFE, {"full_facet": True}),
     "triangles": (lambda: triangles(1, 4, 100.0, hole=True), BED, {"max_patch": (100, 80)}),
@@ -126,6 +141,16 @@ def test_seams_without_a_tab_are_those_of_which_a_finding_says_so(findings: bool
     assert faults_of("bare", findings=tuple(first) if findings else ()) == [
         says.format("3 seam edges have", 9) if findings else says.format("4 seam edges have", 8)
     ]
+
+
+def test_a_seam_between_pieces_is_named_by_its_first_edge() -> None:
+    layout = laid_out("pieces")[3]
+    bare = tuple(replace(patch, tabs=()) for patch in layout.patches)
+    assert layout.pattern.seams is not None
+    (one, other), *_ = layout.pattern.seams.tolist()
+    assert one != other
+    says, _ = faults_of("pieces", patches=bare)
+    assert says == f"4 seam edges have no tab, and no finding says so, the first is edge {one}."
 
 
 def test_a_border_tab_lies_beside_its_facet() -> None:
