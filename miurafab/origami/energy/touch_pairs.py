@@ -70,12 +70,17 @@ class NearPairs:
         corners = points[self._triangles]
         centre = corners.mean(axis=1)
         radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-        farthest = float(radius.max(initial=0.0)) + reach
-        found = tree_of(points).sparse_distance_matrix(
-            tree_of(centre), farthest, output_type="ndarray"
-        )
-        vertex, triangle = found["i"].astype(np.int64), found["j"].astype(np.int64)
-        near = found["v"] <= radius[triangle] + reach
+        tree, found = tree_of(points), []
+        for some in _alike(radius):
+            farthest = float(radius[some].max()) + reach
+            near = tree.sparse_distance_matrix(
+                tree_of(centre[some]), farthest, output_type="ndarray"
+            )
+            found.append(np.stack([near["i"], some[near["j"]]]))
+        vertex, triangle = _joined(found)
+        low, high = corners.min(axis=1) - reach, corners.max(axis=1) + reach
+        at = points[vertex]
+        near = ((low[triangle] <= at) & (at <= high[triangle])).all(axis=1)
         vertex, triangle = vertex[near], triangle[near]
         apart = self._apart(vertex[:, None], self._triangles[triangle])
         return vertex[apart], triangle[apart]
@@ -84,9 +89,19 @@ class NearPairs:
         ends = points[self._edges]
         middle = ends.mean(axis=1)
         half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2
-        farthest = 2 * float(half.max(initial=0.0)) + reach
-        pairs = tree_of(middle).query_pairs(farthest, output_type="ndarray").astype(np.int64)
-        one, other = pairs.T
+        found, shorter = [], np.empty(0, dtype=np.int64)
+        for some in _alike(half):
+            farthest, tree = float(half[some].max()) + reach, tree_of(middle[some])
+            within = tree.query_pairs(farthest + float(half[some].max()), output_type="ndarray")
+            found.append(some[within].T)
+            if len(shorter):
+                farthest += float(half[shorter].max())
+                near = tree.sparse_distance_matrix(
+                    tree_of(middle[shorter]), farthest, output_type="ndarray"
+                )
+                found.append(np.stack([some[near["i"]], shorter[near["j"]]]))
+            shorter = np.concatenate([shorter, some])
+        one, other = np.sort(_joined(found), axis=0)
         apart = np.linalg.norm(middle[one] - middle[other], axis=1)
         near = apart <= half[one] + half[other] + reach
         one, other = one[near], other[near]
@@ -107,6 +122,21 @@ class NearPairs:
         """(n,) a number for each set of four vertices (n, 4)."""
         a, b, c, d = np.sort(corners, axis=1).T
         return np.asarray(((a * self._count + b) * self._count + c) * self._count + d)
+
+
+def _alike(size: Floats) -> list[Ints]:
+    """The numbers of things of about one ``size`` (n,), small ones first: with few large ones among
+    them, a search as wide as for the largest finds mostly what is not near.
+    """
+    if not len(size):
+        return []
+    level = np.ceil(np.log2(np.maximum(size / np.median(size), 1.0)) - 1e-9)
+    return [np.flatnonzero(level == each) for each in np.unique(level)]
+
+
+def _joined(found: list[Ints]) -> Ints:
+    """The pairs (2, n) of all ``found`` (2, m)."""
+    return np.concatenate([np.empty((2, 0), dtype=np.int64), *found], axis=1).astype(np.int64)
 
 
 def _crossing(points: Floats, stencils: Ints) -> Floats:

@@ -237,6 +237,31 @@ def test_pairs_are_those_within_reach_that_no_sides_join() -> None:
     assert not len(NearPairs(triangles, sides, np.array([[0, 1, 2, 3]]), shape).at(shape).edges)
 
 
+def test_pairs_of_any_sizes_are_found_as_by_trying_all() -> None:
+    """Few long edges and large triangles among short and small ones; all vertices move at random,
+    so that of two edges the other may become the longer one.
+    """
+    random = np.random.default_rng(3)
+    corners_of = [2] * 20 + [3] * 20
+    size = np.repeat(10 ** random.uniform(-1.5, 0.5, 40), corners_of)[:, None]
+    middle = np.repeat(random.uniform(0, 1, (40, 3)), corners_of, axis=0)
+    flat = middle + size * random.uniform(-0.5, 0.5, (100, 3))
+    points = flat + 0.05 * random.normal(size=(100, 3))
+    edges, triangles = np.arange(40).reshape(-1, 2), np.arange(40, 100).reshape(-1, 3)
+    corners = [[v, *triangle] for v in range(100) for triangle in triangles if v not in triangle]
+    ends = [[*edges[one], *edges[other]] for one in range(20) for other in range(one + 1, 20)]
+    stencils = np.array(corners + ends)
+    crossing = np.arange(len(stencils)) >= len(corners)
+    apart = gaps(points, stencils, crossing).distance
+    height = np.minimum(HEIGHT, 0.5 * gaps(flat, stencils, crossing).distance)
+    wanted = {tuple(stencils[n]): (apart[n], height[n]) for n in np.flatnonzero(apart <= REACH)}
+    found = NearPairs(triangles, edges, NO_HINGES, flat).at(points)
+    assert len(found.edges) == len(wanted) > 100
+    assert sum(low < HEIGHT for _, low in wanted.values()) > 5
+    for row, distance, low in zip(found.stencils, found.distance, found.height, strict=True):
+        assert wanted[tuple(row)] == pytest.approx((distance, low))
+
+
 def test_parallel_edges_push_less_than_edges_that_cross() -> None:
     far = [[9, 9, 9], [9, 8, 9], [8, 9, 9]]
     flat = np.array([[0, 0, 0], [1, 0, 0], [0, 5, 0], [1, 5, 0], *far], float)
