@@ -108,15 +108,19 @@ def fold_from_flat(
 
     walk = RampWalk(model, near, np.random.default_rng(seed), tell)
     start = linear_seed(model)
-    nominal = float(parts[1]) / finer
+    nominal, stuck = float(parts[1]) / finer, 0
     found = any(walk.leave_flat(start.heights, nominal * first) for first in FIRST_PARTS)
     for number, part in enumerate(parts[1:].tolist()):
         found = found and walk.reach(part, nominal)
         if not found:
             break
         frame = walk.frame()
-        if frame.unstable and walk.leave_saddle():
-            frame = walk.frame()
+        if frame.unstable > stuck:
+            if walk.leave_saddle():
+                frame = walk.frame()
+            else:  # nor will it leave those that follow
+                stuck = frame.unstable
+        stuck = min(stuck, frame.unstable)
         frames.append(frame)
         if on_progress is not None:
             on_progress((number + 1) / (len(parts) - 1), f"step {number + 1} of {len(parts) - 1}")

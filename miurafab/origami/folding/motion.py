@@ -18,10 +18,12 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from miurafab.errors import InputError, PatternError
+from miurafab.geometry.arrays import Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import cut_open
 from miurafab.origami.energy.bar_hinge import SOFTNESS
@@ -29,7 +31,7 @@ from miurafab.origami.energy.ruled import is_ruled
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
 from miurafab.origami.folding.certificate import RigidCertificate, certified
-from miurafab.origami.folding.first_order import refuse_locked
+from miurafab.origami.folding.first_order import refuse_locked, waiting_folds
 from miurafab.origami.folding.flat_edges import without_flat_edges
 from miurafab.origami.folding.kinematics import (
     FoldingMotion,
@@ -129,13 +131,15 @@ def _find(pattern: CreasePattern, steps: int, on_progress: Progress | None) -> F
 def _from_flat(
     pattern: CreasePattern, steps: int, mismatch: float | None, on_progress: Progress | None
 ) -> FoundMotion:
-    softness = SOFTNESS
+    softness, waiting = SOFTNESS, waiting_folds(pattern)
     most = MOST_AGAIN // len(pattern.vertices_coords)
     again = steps <= most
-    motion, verdict = _followed(pattern, steps, again, on_progress)
+    motion, verdict = _followed(pattern, steps, again, waiting, on_progress)
     if verdict.is_held_back and again:
         progress = _named(on_progress, "softer paper")
-        soft, its_verdict = ramp_motion(pattern, steps, softness=SOFTER, on_progress=progress)
+        soft, its_verdict = ramp_motion(
+            pattern, steps, softness=SOFTER, waiting=waiting, on_progress=progress
+        )
         if its_verdict.is_better_than(verdict):
             softness, motion, verdict = SOFTER, soft, its_verdict
     # beside a curved crease facets bend, so that what flat ones could not do says nothing
@@ -150,7 +154,12 @@ def _from_flat(
         with suppress(PatternError):
             progress = _named(on_progress, "with contact")
             apart, its_verdict = ramp_motion(
-                pattern, steps, touching=True, softness=softness, on_progress=progress
+                pattern,
+                steps,
+                touching=True,
+                softness=softness,
+                waiting=waiting,
+                on_progress=progress,
             )
             if _waits(its_verdict, ruled) or its_verdict.wrong_signs <= MOST_WRONG:
                 motion, verdict = apart, its_verdict
@@ -163,19 +172,20 @@ def _from_flat(
 
 
 def _followed(
-    pattern: CreasePattern, steps: int, again: bool, on_progress: Progress | None
+    pattern: CreasePattern, steps: int, again: bool, waiting: Ints, on_progress: Progress | None
 ) -> tuple[FoldingMotion, RampVerdict]:
     """The motion from flat. Where it is lost it is gone ``again`` in finer steps: the number of
     frames that are asked for shall not decide whether a pattern folds.
     """
     finely = _named(on_progress, "finer steps")
+    follow = partial(ramp_motion, pattern, steps, waiting=waiting)
     try:
-        motion, verdict = ramp_motion(pattern, steps, on_progress=on_progress)
+        motion, verdict = follow(on_progress=on_progress)
     except PatternError:
-        return ramp_motion(pattern, steps, finer=FINER, on_progress=finely)
+        return follow(finer=FINER, on_progress=finely)
     if verdict.complete or not again:
         return motion, verdict
-    fine, its_verdict = ramp_motion(pattern, steps, finer=FINER, on_progress=finely)
+    fine, its_verdict = follow(finer=FINER, on_progress=finely)
     farther = its_verdict.complete or len(fine.frames) > len(motion.frames)
     return (fine, its_verdict) if farther else (motion, verdict)
 

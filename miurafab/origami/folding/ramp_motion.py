@@ -104,13 +104,14 @@ def ramp_motion(
     touching: bool = False,
     softness: float = SOFTNESS,
     finer: int = 1,
+    waiting: Ints | None = None,
     on_progress: Callable[[float, str], None] | None = None,
 ) -> tuple[FoldingMotion, RampVerdict]:
     """The motion of ``pattern`` from flat, all creases together, and its verdict.
 
     With ``touching`` springs keep facets from passing through each other. ``softness`` is the
     compliance of a side over its length, in facets' stiffness k_f, and ``finer`` the number of
-    steps to a frame.
+    steps to a frame. ``waiting`` are the :func:`waiting_folds` of the pattern, if they are known.
 
     ``states`` are the parts of the fold angles of the pattern that creases strive for. Creases of
     half a turn go to nine tenths of it. If the solver loses the path, the motion ends there. Raises
@@ -124,6 +125,8 @@ def ramp_motion(
             "The pattern has no mountain or valley between two facets, so nothing folds; give its "
             "creases the letters M and V."
         )
+    if waiting is None:
+        waiting = waiting_folds(pattern)
     parts = ramp_parts(pattern, steps)
     paths = []
     for number, piece in enumerate(folding):
@@ -141,7 +144,7 @@ def ramp_motion(
     if not count:
         if is_ruled(pattern):
             raise _unfollowed(pattern, float(parts[1]))
-        raise _stuck(paths, waiting_folds(pattern))
+        raise _stuck(paths, waiting)
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     frames = np.repeat(flat[None], count + 1, axis=0)
     angles = np.zeros((count + 1, len(pattern.edges_vertices)))
@@ -150,7 +153,7 @@ def ramp_motion(
     states = parts[: count + 1]
     frames = laid_on_each_other(pattern, states, frames)
     motion = FoldingMotion(pattern, states, frames, angles, mismatch=None, method=FROM_FLAT)
-    return motion, _verdict(folding, paths, count, touching, waiting_folds(pattern))
+    return motion, _verdict(folding, paths, count, touching, waiting)
 
 
 def _enter(frames: Floats, angles: Floats, piece: Piece, path: RampPath) -> None:

@@ -48,12 +48,15 @@ ROUNDS = 200
 MOST_ARMINGS = 5
 """How often a step is solved anew with springs between what came to touch in it."""
 MOST_FACTORS = 4
-"""How many factorisations Newton's iteration gets where facets may touch, before a descent."""
+"""How many factorisations Newton's iteration gets after a descent, and where facets may touch
+before one."""
 ARMED = 0.1
 """Mean edges within which a pair has its spring from the beginning of a step."""
 LEASH = REACH - HEIGHT
 """Mean edges by which two things may come nearer before it is looked anew which are near."""
 MOST_PIECES, PIECE_ROUNDS = 80, 60
+HALF_ROUNDS = 20
+"""The most steps of a descent to a frame with bars half-way to stiff ones."""
 """The most pieces of a descent with facets that touch, and the most steps of each."""
 FIRST, LONGER, SHORTEST = 1.0 / 8.0, 1.6, 1.0 / 64.0
 """Of the step between two frames: the first step, the growth after one that holds, the least."""
@@ -66,7 +69,11 @@ MAX_SNAPS = 20
 """A path that has to be shaken more often is lost."""
 LEAST_PATIENCE = 8
 """How many factorisations a frame gets at least to find its stiff shape: each that finds none
-halves what the next one gets. Curved creases have no stiff shapes, and spent most of their time so.
+halves what the next one gets.
+"""
+PAUSE = 3
+"""The frames of a sheet with curved creases that are left as they are after one that found no stiff
+shape with the least patience. Such a sheet has none, and spent most of its time looking for it.
 """
 FIRMER = 100.0
 """The factor on the stiffness of facets in a frame."""
@@ -116,7 +123,7 @@ class RampWalk:
         self._known: list[Known] = []
         self._factored: Factored | None = None
         self._step = FIRST
-        self._patience = MAX_ITERATIONS
+        self._patience, self._pause = MAX_ITERATIONS, 0
         self.snaps = 0
         self._near = near
         self._pairs = NO_PAIRS
@@ -160,22 +167,36 @@ class RampWalk:
     def frame(self) -> RampFrame:
         """The last state with stiff bars, if they find a stable balance near it, or as it is."""
         here = self._known[-1]
+        if self._pause:
+            self._pause -= 1
+            return _frame(self._soft, here, False)
+        hard = self._hardened(here)
+        if hard is not None:
+            self._patience = MAX_ITERATIONS
+            return hard
+        curved = len(self._soft.model.ruled) > 0
+        self._pause = PAUSE if curved and self._patience == LEAST_PATIENCE else 0
+        self._patience = max(LEAST_PATIENCE, self._patience // 2)
+        return _frame(self._soft, here, False)
+
+    def _hardened(self, here: Known) -> RampFrame | None:
+        """The stable balance with stiff bars near ``here``; None where none is found."""
         self._stiff.last[:] = self._soft.last
         found = self._solved(self._stiff, here.state, here.drive, factors=self._patience)
-        self._patience = (
-            MAX_ITERATIONS if found.converged else max(LEAST_PATIENCE, self._patience // 2)
-        )
-        if self._near is not None and not found.converged:
+        half_way = self._near is not None and self._patience > LEAST_PATIENCE
+        if half_way and not found.converged:
             self._half.last[:] = self._soft.last
             self._arm(here.state.points, REACH)
-            ended = descend(self._half, here.state.points, here.drive, ENOUGH, PIECE_ROUNDS, LEASH)
-            found = self._solved(self._stiff, self._half.state(ended.points), here.drive)
-        if found.converged and self._is_free(here.state.points, found.state.points):
-            turned = self._stiff.angles(found.state.points) - self._soft.last
-            hard = _frame(self._stiff, Known(here.drive, found.state), True)
-            if np.abs(turned).max(initial=0.0) <= NEAR and not hard.unstable:
-                return hard
-        return _frame(self._soft, here, False)
+            ended = descend(self._half, here.state.points, here.drive, ENOUGH, HALF_ROUNDS, LEASH)
+            half = self._half.state(ended.points)
+            found = self._solved(self._stiff, half, here.drive, factors=self._patience)
+        if not found.converged or not self._is_free(here.state.points, found.state.points):
+            return None
+        turned = self._stiff.angles(found.state.points) - self._soft.last
+        if np.abs(turned).max(initial=0.0) > NEAR:
+            return None
+        hard = _frame(self._stiff, Known(here.drive, found.state), True)
+        return None if hard.unstable else hard
 
     def stiffened_back(self, frames: list[RampFrame]) -> list[RampFrame]:
         """``frames``, all with stiff bars if the stiff path leads back to the first of them.
@@ -207,7 +228,8 @@ class RampWalk:
     def _land(self, points: Floats, part: float) -> bool:
         """Find a balance at ``part`` by descent from ``points``."""
         ended = self._descend(points, part)
-        found = self._solved(self._soft, self._soft.state(ended.points), part)
+        start = self._soft.state(ended.points)
+        found = self._solved(self._soft, start, part, factors=MOST_FACTORS)
         turned = np.abs(self._soft.angles(found.state.points) - self._soft.last)
         if not found.converged or turned.max(initial=0.0) > LARGEST_TURN:
             return False
@@ -318,8 +340,8 @@ class RampWalk:
         factors: int = MAX_ITERATIONS,
     ) -> Solution:
         """The balance near ``guess``; pairs that come to touch get their springs on the way."""
-        definite = self._near is not None and balance is self._soft
-        factors = MOST_FACTORS if definite else factors
+        definite = self._near is not None
+        factors = MOST_FACTORS if definite and balance is self._soft else factors
         for _ in range(MOST_ARMINGS):
             balance = balance.with_pairs(self._pairs.those(self._armed))
             found = solve(balance, guess, part, factored, definite=definite, factors=factors)

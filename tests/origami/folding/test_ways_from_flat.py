@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from miurafab.errors import PatternError
+from miurafab.origami.energy.bar_hinge import flat_model
 from miurafab.origami.energy.equilibrium import solve
-from miurafab.origami.folding import motion, ramp_walk
+from miurafab.origami.folding import from_flat, motion, ramp_walk
+from miurafab.origami.folding import ramp_motion as ramp_motion_module
+from miurafab.origami.folding.first_order import waiting_folds
 from miurafab.origami.folding.judge_motion import motion_findings
 from miurafab.origami.folding.motion import find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
@@ -109,6 +112,27 @@ def test_a_pattern_that_folds_in_a_sequence_is_told_by_its_folds() -> None:
     assert "the first being edge 3" in said
 
 
+def test_which_folds_wait_is_found_once_for_all_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of up to four ways solved the same linear program."""
+    pattern, found, ways = named_patterns.waterbomb_base(), [], []
+
+    def waiting(given: Any) -> Any:
+        found.append(given)
+        return waiting_folds(given)
+
+    def lost(*given: Any, **more: Any) -> Any:
+        ways.append(more)
+        way, verdict = ramp_motion(*given, **more)
+        return way, replace(verdict, complete=False)
+
+    for module in (motion, ramp_motion_module):
+        monkeypatch.setattr(module, "waiting_folds", waiting)
+    monkeypatch.setattr(motion, "ramp_motion", lost)
+    find_motion(pattern, 2)
+    assert len(ways) == 3
+    assert len(found) == 1
+
+
 def test_a_large_sheet_is_followed_once_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """A way lost by a sheet of 1,783 vertices was gone again three times, for minutes."""
     pattern, ways = named_patterns.waterbomb_base(), []
@@ -133,23 +157,55 @@ def test_a_large_sheet_is_followed_once_and_says_so(monkeypatch: pytest.MonkeyPa
     assert told["followed-once"].sentence.endswith("with softer paper or with contact.")
 
 
+@pytest.mark.parametrize(
+    ("curved", "wanted"), [(False, [25, 12, 8, 8, 8, 25, 12, 8, 8]), (True, [25, 12, 8, 8, 25, 12])]
+)
 def test_a_stiff_shape_that_is_not_found_is_looked_for_with_less_patience(
-    monkeypatch: pytest.MonkeyPatch,
+    curved: bool, wanted: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Curved creases have none, and spent most of their time looking for it in each frame."""
+    """Curved creases have none, and spent most of their time looking for it in each frame: after
+    one with the least patience three frames are left out.
+    """
     given = []
+    found_at = wanted.index(25, 1)
 
     def solved(balance: Any, *others: Any, factors: int, **more: Any) -> Any:
         found = solve(balance, *others, factors=factors, **more)
         if balance.model.compliance.any():
             return found
         given.append(factors)
-        return found._replace(converged=len(given) == 5)
+        return found._replace(converged=len(given) == found_at)
+
+    def marked(*pattern: Any, **more: Any) -> Any:
+        model = flat_model(*pattern, **more)
+        return replace(model, ruled=np.array([0])) if curved else model
 
     monkeypatch.setattr(ramp_walk, "solve", solved)
-    _, verdict = ramp_motion(named_patterns.waterbomb_base(), 7)
+    monkeypatch.setattr(from_flat, "flat_model", marked)
+    _, verdict = ramp_motion(named_patterns.waterbomb_base(), 9)
     assert verdict.complete
-    assert given == [25, 12, 8, 8, 8, 25, 12]
+    assert given == wanted
+
+
+def test_a_saddle_that_could_not_be_left_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each trial took a descent, and counted as a snap until the way was lost; one that falls in
+    more directions is another one.
+    """
+    unstable, tried, frame = [3, 3, 2, 3, 0, 1], [], ramp_walk.RampWalk.frame
+    seen: list[int] = []
+
+    def marked(walk: Any) -> Any:
+        seen.append(unstable[len(seen)])
+        return replace(frame(walk), unstable=seen[-1])
+
+    def stays(walk: Any) -> bool:
+        tried.append(len(seen))
+        return False
+
+    monkeypatch.setattr(ramp_walk.RampWalk, "frame", marked)
+    monkeypatch.setattr(ramp_walk.RampWalk, "leave_saddle", stays)
+    ramp_motion(named_patterns.waterbomb_base(), 6)
+    assert tried == [1, 4, 6]
 
 
 def test_facets_that_move_without_force_make_no_position_unstable() -> None:
