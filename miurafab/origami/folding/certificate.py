@@ -130,7 +130,7 @@ def certified(motion: FoldingMotion) -> tuple[FoldingMotion, RigidCertificate]:
         worst = max(worst, found, key=lambda each: each.residual)
     # an edge within a facet does not turn
     angles[:, np.isin(pattern.edges_assignment, UNCREASED)] = 0.0
-    mismatch = loop_mismatch(pattern, place(pattern, angles))
+    mismatch = loop_mismatch(pattern, place(pattern, angles), angles)
     if mismatch.max(initial=0.0) > RIGID:
         return motion, replace(worst, rigid=False, residual=float(mismatch.max()))
     frames = laid_on_each_other(pattern, motion.states, frames)

@@ -113,7 +113,7 @@ def rigid_motion(pattern: CreasePattern, states: ArrayLike) -> FoldingMotion:
     placement = place(pattern, angles)
     frames = placement.points(pattern.vertices_coords, first_facets(pattern, placement.depth))
     laid = laid_on_each_other(pattern, s, frames)
-    return FoldingMotion(pattern, s, laid, angles, loop_mismatch(pattern, placement))
+    return FoldingMotion(pattern, s, laid, angles, loop_mismatch(pattern, placement, angles))
 
 
 def fold_angles_at(pattern: CreasePattern, states: Floats) -> Floats:
@@ -212,15 +212,30 @@ def place(
     return FacetPlacement(turn, shift, depth)
 
 
-def loop_mismatch(pattern: CreasePattern, placement: FacetPlacement) -> Floats:
-    """(T,) the largest distance of two facets at the ends of their crease, in mean edges."""
+def loop_mismatch(pattern: CreasePattern, placement: FacetPlacement, fold_angles: Floats) -> Floats:
+    """(T,) by how far facets at ``fold_angles`` (T, E) miss each other across a crease, mean edges.
+
+    That is the largest distance of two facets at the ends of their crease, or beside it: of a point
+    as far from the crease as that is long, placed by one facet, and by the other turned by the fold
+    angle. Where creases in one line turn alone, all ends meet, and the others do not fold.
+    """
     joined = _joined(pattern)
-    ends = pattern.edges_vertices[joined].reshape(-1)
-    flat = pattern.vertices_coords[ends]
-    left, right = (np.repeat(pattern.edges_faces[joined, side], 2) for side in (0, 1))
-    gap = placement.points(flat, left) - placement.points(flat, right)
+    ends = pattern.vertices_coords[pattern.edges_vertices[joined]]
+    left, right = pattern.edges_faces[joined].T
+    gaps = [placement.points(at, left) - placement.points(at, right) for at in ends.swapaxes(0, 1)]
+    along = ends[:, 1] - ends[:, 0]
+    beside = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    angle = fold_angles[:, joined]
+    turned = np.empty((*angle.shape, 3))
+    turned[..., :2] = np.cos(angle)[..., None] * beside
+    turned[..., 2] = -np.sin(angle) * np.linalg.norm(along, axis=1)
+    turns = placement.turn
+    gaps.append(
+        np.einsum("tnij,tnj->tni", turns[:, left], turned)
+        - np.einsum("tnij,nj->tni", turns[:, right, :, :2], beside)
+    )
     mean = float(edge_lengths(pattern.vertices_coords, pattern.edges_vertices).mean())
-    return np.asarray(np.linalg.norm(gap, axis=2).max(axis=1, initial=0.0) / mean)
+    return np.asarray(np.linalg.norm(gaps, axis=3).max(axis=(0, 2), initial=0.0) / mean)
 
 
 def facet_strain(pattern: CreasePattern, frames: Floats) -> Floats:

@@ -188,7 +188,7 @@ def folded_flat(
         and for facets that are not all joined by creases.
     """
     placement = place(pattern, angles[None])
-    mismatch = float(loop_mismatch(pattern, placement)[0])
+    mismatch = float(loop_mismatch(pattern, placement, angles[None])[0])
     if not mismatch <= most_mismatch:
         raise PatternError(
             f"The sheet does not fold flat: with its creases folded by 180 degrees its facets miss "
@@ -228,7 +228,7 @@ def layer_order(pattern: CreasePattern) -> LayerOrder:
     half = half_tangents(pattern)
     states = np.array([*_ON_THE_WAY, np.inf])
     angles = fold_angles_at(pattern, states)
-    missed = loop_mismatch(pattern, place(pattern, angles[:-1]))
+    missed = loop_mismatch(pattern, place(pattern, angles[:-1]), angles[:-1])
     if not missed.max() <= RIGID:
         raise PatternError(
             "The closed form of folding does not hold for the sheet: by it, its facets miss each "

@@ -271,17 +271,37 @@ def test_no_order_is_claimed_for_what_does_not_fold_flat(tmp_path: Path) -> None
 
 
 def test_a_search_is_not_advised_after_it_was_made() -> None:
-    """Eight creases, valleys and mountains in turn, fold flat in no order of their layers."""
+    order = layer_order(strip("VM"))
+    undecided = replace(order, above=order.above * [0, 1, 1])
+    found = replace(layers(strip("VM")), closed=undecided)
+    assert [finding.code for finding in found.findings] == ["undecided-layers"]
+    assert replace(found, search=search_layer_orders(strip("VM"))).findings == ()
+
+
+def test_eight_creases_in_turn_have_no_order_and_no_closed_form() -> None:
+    """By the speeds of valleys at 90 and mountains at 180 degrees they close at 90 alone."""
     turns = np.radians(np.arange(0, 360, 45))
     ends = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     sizes = {"M": 180.0, "V": 90.0}
     letters = zip(ends, "VM" * 4, strict=True)
     creases = [((0.0, 0.0), (*end,), letter, sizes[letter]) for end, letter in letters]
     found = layers(drawn([*creases, *border(*ends)]))
-    assert found.closed is not None
-    assert [each.code for each in layer_findings(found.closed)] == ["undecided-layers"]
+    assert found.closed is None
     assert (found.exists, found.search.complete) == (False, True)
     assert [finding.code for finding in found.findings] == ["cannot-fold-flat"]
+
+
+@pytest.mark.parametrize("letters", ["VVM", "VUM"])
+def test_a_crease_that_ends_on_another_does_not_fold_flat(letters: str) -> None:
+    """All ends meet where two creases in one line fold; the third, between them, stays open."""
+    corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+    ends = (corners[3], corners[1], corners[2])
+    creases = [((0.0, 0.0), end, each, 180.0) for end, each in zip(ends, letters, strict=True)]
+    found = drawn([*creases, *border(*corners)])
+    assert known_layer_order(found) is None
+    with pytest.raises(PatternError, match=r"does not fold flat: .* up to 1\.6 mean edges"):
+        search_layer_orders(found)
+    assert not layers(found).exists
 
 
 def test_more_layers_than_can_be_searched_are_refused_by_their_number(
