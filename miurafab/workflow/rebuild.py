@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from miurafab.display import Shown
-from miurafab.errors import InputError, PatternError
+from miurafab.errors import InputError, JobStopped, PatternError
 from miurafab.fabrication.glue import glued_shell, laid_on
 from miurafab.fabrication.recover import recovered_corners
 from miurafab.fabrication.retrace import patches_on_sheets
@@ -157,5 +157,7 @@ def _burnt(job: Job, machine: MachineProfile) -> Floats:
     transport = VirtualTransport(virtual_machine(machine))
     with StopSignals() as signals:
         deliver(plan_job(job, machine), transport, signals)
+    if signals.caught is not None:  # by nobody else, as the last word of the job was said
+        raise JobStopped(f"{job.name} was stopped by {signals.reason}.")
     log = transport.device.beam_log
     return np.array([[s.x0, s.y0, s.x1, s.y1] for s in log if not s.standing]).reshape(-1, 4)

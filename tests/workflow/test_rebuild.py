@@ -18,6 +18,7 @@ from miurafab.errors import InputError, JobStopped, PatternError
 from miurafab.fabrication.glue import glued_shell, laid_on
 from miurafab.fabrication.recover import RecoveredCorners
 from miurafab.geometry.polygons import facet_means
+from miurafab.machine.machine_session import MachineSession
 from miurafab.motion.segments import SegmentGenerator
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -95,6 +96,20 @@ def test_a_signal_while_the_beam_is_rebuilt_stops_it(tmp_path, monkeypatch):
     with pytest.raises(JobStopped, match="Ctrl-C"):
         mf.rebuild(tmp_path)
     assert next(calls) > 500
+
+
+def test_a_signal_as_a_sheet_ends_is_not_lost_before_the_next(tmp_path, monkeypatch):
+    """Nothing of that sheet is left to be stopped then."""
+    mf.sheets(regular(4, 4)).write(tmp_path)
+    close = MachineSession.close
+
+    def pressed(self):
+        signal.raise_signal(signal.SIGINT)
+        return close(self)
+
+    monkeypatch.setattr(MachineSession, "close", pressed)
+    with pytest.raises(JobStopped, match="Ctrl-C"):
+        mf.rebuild(tmp_path)
 
 
 def test_facets_that_the_border_has_cut_are_left_out_as_in_check(tmp_path):
