@@ -53,7 +53,7 @@ _STOPPED = ("Hold", "Door", "Tool")
 """The states that last until somebody ends them; grblHAL changes its tool in the last."""
 _HELD_S = 600.0
 """The longest stop that nobody at the keys can end."""
-_LIT_HOLDS = 2  # GRBL puts the beam out a moment after it tells of the hold (protocol.c)
+_LIT_HOLDS = 2  # in laser mode the beam goes out a moment after a hold is told (protocol.c)
 _NEAR_MM = 0.1  # or a step of the motor, if that is longer
 _POLL_S = 0.2  # between status queries while lines flow
 _END_POLL_S = 0.1  # between status queries while the last moves are made
@@ -225,7 +225,7 @@ class GrblDriver(StreamDriver):
         which answers are owed, or nobody is there to end it.
         """
         self._lit_holds = self._lit_holds + 1 if self._burns_now(report, pauses) else 0
-        if self._lit_holds > _LIT_HOLDS:
+        if self._lit_holds > (0 if self._burns_in_hold else _LIT_HOLDS):
             raise ControllerError(
                 f"{self.plan.job.name} was held {self._streamer.where}, and the controller leaves "
                 "the beam on in a hold"

@@ -572,7 +572,7 @@ def test_a_hold_at_the_machine_that_leaves_the_beam_on_ends_the_job(dialect: str
     ):
         deliver(plan_job(job, machine, FORCED), wire, StopSignals())
     assert not wire.device.beam_on
-    assert standing_seconds(wire.device.beam_log) < 1.0
+    assert standing_seconds(wire.device.beam_log) < 0.3
 
 
 @pytest.mark.parametrize("dialect", ["grbl-0.9", "grbl-1.1"])
