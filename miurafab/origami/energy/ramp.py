@@ -50,7 +50,7 @@ LARGEST_TURN = 1.0
 LARGEST_MOVE = 0.3
 """Mean edges by which one step of a descent may move a vertex."""
 FIRST_MU, LEAST_MU, GREATEST_MU = 1e-3, 1e-12, 1e6
-SHARPER, BLUNTER = 0.1, 4.0
+SHARPER, BLUNTER = 1.0 / 3.0, 4.0
 """The factors on mu after a step that is taken, and after one that is not."""
 SHORTENINGS = 5
 """How often a step is halved before mu is raised: a new mu costs a factorisation."""

@@ -55,8 +55,6 @@ ARMED = 0.1
 LEASH = REACH - HEIGHT
 """Mean edges by which two things may come nearer before it is looked anew which are near."""
 MOST_PIECES, PIECE_ROUNDS = 80, 60
-HALF_ROUNDS = 20
-"""The most steps of a descent to a frame with bars half-way to stiff ones."""
 """The most pieces of a descent with facets that touch, and the most steps of each."""
 FIRST, LONGER, SHORTEST = 1.0 / 8.0, 1.6, 1.0 / 64.0
 """Of the step between two frames: the first step, the growth after one that holds, the least."""
@@ -187,7 +185,7 @@ class RampWalk:
         if half_way and not found.converged:
             self._half.last[:] = self._soft.last
             self._arm(here.state.points, REACH)
-            ended = descend(self._half, here.state.points, here.drive, ENOUGH, HALF_ROUNDS, LEASH)
+            ended = descend(self._half, here.state.points, here.drive, ENOUGH, PIECE_ROUNDS, LEASH)
             half = self._half.state(ended.points)
             found = self._solved(self._stiff, half, here.drive, factors=self._patience)
         if not found.converged or not self._is_free(here.state.points, found.state.points):
