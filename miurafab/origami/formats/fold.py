@@ -72,7 +72,12 @@ from miurafab.origami.formats.folded_only import (
 )
 from miurafab.origami.formats.line_crossings import lines_cross
 from miurafab.origami.formats.loose_parts import LoosePartsError
-from miurafab.origami.formats.planar_graph import enclosed_facets, oriented, pattern_from_lines
+from miurafab.origami.formats.planar_graph import (
+    enclosed_facets,
+    oriented,
+    pattern_from_lines,
+    sides_within_a_facet,
+)
 from miurafab.origami.formats.target_frame import (
     exact_frames,
     in_own_frame,
@@ -206,15 +211,15 @@ def read_further_frames(path: Path) -> tuple[FurtherFrame, ...]:
 
 def _are_lines(flat: Floats, edges: Ints, assignment: NDArray[np.str_]) -> bool:
     """Whether the ``edges`` of a file without facets are lines of a drawing, of which facets are
-    yet to be made: they cross, or some lie loose inside a facet.
+    yet to be made: they cross, or some lie loose inside a facet, or at the end of a line there.
     """
     if lines_cross(flat, edges):
         return True
     try:
-        enclosed_facets(flat, edges, assignment)
+        faces = enclosed_facets(flat, edges, assignment)
     except LoosePartsError:
         return True
-    return False
+    return bool(sides_within_a_facet(faces, edges, len(flat)).any())
 
 
 def parse_fold(document: Any) -> CreasePattern:

@@ -80,17 +80,21 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
         raise PatternError("The drawing holds no line.")
     if not (np.abs(lines.ends) < FARTHEST).all():
         raise too_far()
-    lines = corners_at_ends(lines)
+    lines, drawn = corners_at_ends(lines), None
     try:
         near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
-        drawn = _joined(lines, split_lines(lines, near))
+        sides = split_lines(lines, near)
+        drawn = _joined(lines, sides)
+        if drawn.has_parts_at_ends:
+            _joined(lines, sides, cut_off=True)
     except LoosePartsError as fault:
-        if not len(fault.bridges):
+        if len(fault.bridges):
+            lines = with_flat_lines(lines, fault.bridges)
+            near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
+            drawn = _joined(lines, split_lines(lines, near))
+            told += (told_of_loose_parts(fault.parts),)
+        elif drawn is None:
             raise
-        lines = with_flat_lines(lines, fault.bridges)
-        near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
-        drawn = _joined(lines, split_lines(lines, near))
-        told += (told_of_loose_parts(fault.parts),)
     if lines.curve is None:
         return replace(drawn.pattern, told=drawn.pattern.told + told)
     bent = rulings(drawn.pattern, lines.curve[drawn.source] >= 0)
@@ -150,15 +154,29 @@ class _Joined:
         """(E,) the lengths of the edges."""
         return edge_lengths(self.pattern.vertices_coords, self.pattern.edges_vertices)
 
+    @property
+    def has_parts_at_ends(self) -> bool:
+        """Whether a line leads to a part inside a facet, which so lies on both sides of it."""
+        faces, edges = self.pattern.faces_vertices, self.pattern.edges_vertices
+        return bool(sides_within_a_facet(faces, edges, len(self.pattern.vertices_coords)).any())
 
-def _joined(lines: CreaseLines, drawn: DrawnSides) -> _Joined:
-    """The pattern of the sides that ``lines`` were cut into."""
-    points, every, line = drawn.points, drawn.sides, drawn.line
+
+def _joined(lines: CreaseLines, drawn: DrawnSides, *, cut_off: bool = False) -> _Joined:
+    """The pattern of the sides that ``lines`` were cut into; parts of a facet to which a line leads
+    count as loose if they are ``cut_off``.
+    """
+    every, line = drawn.sides, drawn.line
     stands_for = _without_doubles(every, line, lines.assignment)
-    points, sides, rows = _without_loose_ends(points, every, np.unique(stands_for))
-    if not len(sides):
-        raise PatternError("The lines of the drawing enclose no facet; is the border there?")
-    faces = faces_of_plane_graph(points, sides)
+    rows = np.unique(stands_for)
+    while True:
+        points, sides, rows = _without_loose_ends(drawn.points, every, rows)
+        if not len(sides):
+            raise PatternError("The lines of the drawing enclose no facet; is the border there?")
+        faces = faces_of_plane_graph(points, sides)
+        within = sides_within_a_facet(faces, sides, len(points))
+        if not (cut_off and within.any()):
+            break
+        rows = rows[~within]
     letter = lines.assignment[line[rows]]
     pieces, piece = connected_parts(faces)
     whole = without_holes(faces, piece, sides, letter, len(points))
@@ -326,6 +344,13 @@ def without_holes(
     creased = np.bincount(face, ~cut, minlength=len(faces)) > 0
     bare = np.bincount(piece, creased) == 0
     return np.asarray(creased | bare[piece])
+
+
+def sides_within_a_facet(faces: Ints, sides: Ints, vertices: int) -> Bools:
+    """(E,) the sides of which one facet lies on both sides: they lead to a part inside of it."""
+    face, side = _face_sides(faces, sides, vertices)
+    key, count = np.unique(face * len(sides) + side, return_counts=True)
+    return np.isin(np.arange(len(sides)), key[count > 1] % len(sides))
 
 
 def _sides_of_faces(faces: Ints, sides: Ints, vertices: int) -> Ints:

@@ -152,6 +152,28 @@ def test_no_tolerance_moves_ends_over_other_lines(count: int, seed: int) -> None
     assert overlaps(found).tolist() == []
 
 
+@pytest.mark.parametrize("letter", ["F", "V"])
+def test_a_line_to_a_window_leaves_polygons(letter: str) -> None:
+    """One facet lay on both sides of it, whose border is no polygon: `sheets` refused it."""
+    lines = drawn(*SQUARE, *ring("B", 1, 1, 0.5, 4), (letter, 1, 1.5, 1, 2))
+    found = pattern_from_lines(lines)
+    assert len(found.faces_vertices) == 3
+    assert overlaps(found).tolist() == []
+    for face in found.faces_vertices:
+        corners = face[face >= 0]
+        assert len(np.unique(corners)) == len(corners)
+    assert ((1.0, 1.5), (1.0, 2.0)) in edge_set(found, letter)
+    assert {finding.code for finding in found.told} == {"loose-parts", "holes"}
+    # so in a FOLD file without facets
+    corners, ends = np.unique(lines.ends.reshape(-1, 2).round(9), axis=0, return_inverse=True)
+    document = {
+        "vertices_coords": corners.tolist(),
+        "edges_vertices": ends.reshape(-1, 2).tolist(),
+        "edges_assignment": lines.assignment.tolist(),
+    }
+    assert len(parse_fold(document).faces_vertices) == 3
+
+
 def test_windows_side_by_side_leave_polygons() -> None:
     windows = [line for x in (0.4, 1.0, 1.6) for line in ring("B", x, 1, 0.2, 12)]
     found = pattern_from_lines(drawn(*SQUARE, *windows))
