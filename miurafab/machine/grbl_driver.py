@@ -101,7 +101,7 @@ class GrblDriver(StreamDriver):
         known.clear_overrides()
         if plan.options.home:
             self.at_risk = True
-            session.home(self._take_keys)
+            known.home(self._take_keys)
             self.at_risk = False
         status = session.wait_status()
         self.at_risk = status.beam_on

@@ -9,7 +9,7 @@ overrides) is the conversation's. Both together are the :class:`MachineState`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from miurafab.errors import InputError
@@ -222,6 +222,15 @@ class KnownController:
         self._unknown |= {OFFSETS, MODES}
         if writes_setting(text.encode("ascii")):
             self._unknown |= {SETTINGS, STARTUP, BUILD}
+
+    def home(self, heed: Callable[[], None] = lambda: None) -> None:
+        """See :meth:`Session.home`. The startup blocks that run behind it may change modes and
+        offsets, and arm the beam.
+        """
+        try:
+            self._session.home(heed)
+        finally:
+            self.may_differ()
 
     # What a job needs
 

@@ -186,7 +186,7 @@ class MachineSession:
         """Run the homing cycle (``$H``) and wait for its end."""
         self.open()
         self._at_risk = True
-        self._or_stop(self.conversation.home)
+        self._or_stop(self.known.home)
         return self.look()
 
     def jog(

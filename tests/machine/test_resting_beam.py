@@ -272,6 +272,31 @@ def test_the_key_of_homing_leaves_no_beam_on(laser_mode: bool) -> None:
     assert "M5" in session.state.modes
 
 
+def test_what_homing_runs_is_asked_for_before_the_head_moves_again() -> None:
+    """A jog burnt its way from the second homing on, and a job began in inches."""
+    session, wire = here(laser_mode=True, **{f"_{n}": value for n, value in HOMING.items()})
+    session.unlock()
+    session.say("$N0=M3S1000G20")
+    for _ in range(2):
+        session.home()
+        session.jog(x=-9.0, y=-9.0)
+    assert wire.device.beam_log == []
+    session.set_origin()
+    session.home()
+    session.cut(plan_job(Job("dark.nc", "G1 X20 F3000\n"), MACHINE))
+    assert session.state.position[0] == pytest.approx(20, abs=0.1)
+    assert wire.device.beam_log == []
+
+
+def test_a_job_that_homes_first_begins_in_known_modes() -> None:
+    session, wire = here(laser_mode=True, **{f"_{n}": value for n, value in HOMING.items()})
+    session.unlock()
+    assert all(is_sent(session, wire, line) for line in ["$N0=M3S1000", "M5S0"])
+    session.look()
+    session.cut(plan_job(Job("dark.nc", "G1 X-20 F3000\n"), MACHINE, SendOptions(home=True)))
+    assert wire.device.beam_log == []
+
+
 @pytest.mark.parametrize(
     ("laser_mode", "armed", "lights"),
     [(True, "M3S500", True), (True, "M4S500", False), (False, "", False), (True, "M5S500", False)],
