@@ -161,7 +161,8 @@ def _meant(text: str) -> str:
     """``text`` without what changes nothing: numpy takes any negative number for the size that it
     works out, and the ``strict=True`` of a zip guards against other faults.
     """
-    return re.sub(r"reshape\(-\d", "reshape(-1", re.sub(r",\s*(strict=\w+)?\s*\)", ")", text))
+    text = re.sub(r",\s*(strict=\w+)?\s*(?=\)|$)", "", text)
+    return re.sub(r"reshape\(-\d", "reshape(-1", text)
 
 
 def _compiles(code: str) -> bool:
