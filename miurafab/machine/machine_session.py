@@ -396,4 +396,5 @@ class MachineSession:
             raise
         finally:
             self._in_job = False
+            self._resting_beam.forget()
             self.known.may_differ()

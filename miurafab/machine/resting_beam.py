@@ -86,6 +86,10 @@ class RestingBeam:
         self._held = ""
         self._since: list[str] = []
 
+    def forget(self) -> None:
+        """Something else was done: the line that was held back is a new one when it comes again."""
+        self._held = ""
+
     def sure_of(self, line: str) -> str:
         """``line`` as it is to be sent. Raises :class:`~miurafab.errors.GcodeError` for one that
         would put the resting beam on, or its power up, unless it is the same as the last.

@@ -356,6 +356,16 @@ def test_a_job_begins_dark_whatever_override_was_left_with_an_armed_beam() -> No
     assert standing_seconds(wire.device.beam_log) == 0.0
 
 
+def test_a_line_that_was_held_back_before_a_job_is_held_back_after_it() -> None:
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "M3S500")
+    session.cut(
+        plan_job(Job("a.nc", "G0 X9\n"), MACHINE, SendOptions(force=frozenset({"laser-mode"})))
+    )
+    assert not is_sent(session, wire, "M3S500")
+    assert not wire.device.beam_on
+
+
 @pytest.mark.parametrize("text", ["M4 S0\nG0 X9\nM5\n", "G0 X500\n"])
 def test_a_beam_that_rests_before_a_job_goes_out_with_the_refusal(text: str) -> None:
     session, wire = here(laser_mode=False)
