@@ -13,13 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from miurafab.findings import Finding, counted
-from miurafab.geometry.arrays import Bools, Ints, vector_product
-from miurafab.geometry.polygons import edge_lengths, facet_means, facet_normals
+from miurafab.geometry.arrays import Bools, Ints
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami import invariants
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import opened_cuts
 from miurafab.origami.flat_folding import judge_flat_folding
-from miurafab.origami.folding.contact import overlaps, self_intersections
+from miurafab.origami.folding.contact import (
+    TOGETHER,
+    lie_together,
+    overlaps,
+    self_intersections,
+)
 from miurafab.origami.invariants import DEGENERATE, EXACT, ROUNDINGS, Residuals
 from miurafab.origami.judge_creases import (
     MeasuredFolds,
@@ -37,9 +42,6 @@ STEEP_FOLD = math.radians(165)
 
 MUCH_PAPER = 4.0
 """From this area ratio on, the paper lies in more than four layers on average."""
-
-TOGETHER = 1e-6
-"""Radians, and mean edges: facets nearer to one plane lie on each other."""
 
 LITTLE_COVERED, MUCH_OVERHANG = 0.95, 0.01
 
@@ -186,15 +188,8 @@ def _lie_together(pattern: CreasePattern, pairs: Ints, worst: float) -> Bools:
     """(n,) whether the two facets of each of ``pairs`` lie in one plane of the folded form, whose
     largest residual is ``worst``.
     """
-    points, faces = pattern.folded_coords, pattern.faces_vertices
-    assert points is not None
-    normals, middles = facet_normals(points, faces), facet_means(points, faces)
-    one, other = pairs.T
-    near = TOGETHER + ROUNDINGS * worst
-    level = np.linalg.norm(vector_product(normals[one], normals[other]), axis=1) <= near
-    apart = np.abs(np.einsum("nk,nk->n", middles[other] - middles[one], normals[one]))
-    mean = float(edge_lengths(points, pattern.edges_vertices).mean())
-    return np.asarray(level & (apart <= near * mean))
+    assert pattern.folded_coords is not None
+    return lie_together(pattern, pattern.folded_coords, pairs, TOGETHER + ROUNDINGS * worst)
 
 
 def proved(

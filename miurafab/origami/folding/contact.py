@@ -21,7 +21,7 @@ import numpy as np
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, places_in_runs, run_starts, vector_product
 from miurafab.geometry.boxes import meeting_pairs
-from miurafab.geometry.polygons import signed_areas
+from miurafab.geometry.polygons import edge_lengths, facet_means, facet_normals, signed_areas
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.triangles import facet_triangles
 
@@ -30,6 +30,8 @@ IN_PLANE = 1e-9
 
 TOUCH = 1e-6
 """Facets that overlap by less than this part of the mean side only touch."""
+TOGETHER = 1e-6
+"""Radians, and mean edges: facets nearer to one plane lie on each other."""
 
 _CHUNK = 30_000
 _MANY = 8
@@ -50,11 +52,29 @@ def self_intersections(pattern: CreasePattern) -> Ints:
 def most_meeting(pattern: CreasePattern, shapes: Floats) -> int:
     """The most pairs of facets that pass through each other in one of the ``shapes`` (n, V, 3).
 
-    Bent facets are the triangles of the bar-and-hinge model.
+    Bent facets are the triangles of the bar-and-hinge model. Layers that lie on each other pass
+    through nothing.
     """
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     split = facet_triangles(flat, pattern.faces_vertices)
-    return max((len(meeting_facets(pattern, points, split)) for points in shapes), default=0)
+    met = ((points, meeting_facets(pattern, points, split)) for points in shapes)
+    return max((int((~lie_together(pattern, *each)).sum()) for each in met), default=0)
+
+
+def lie_together(
+    pattern: CreasePattern, points: Floats, pairs: Ints, near: float = TOGETHER
+) -> Bools:
+    """(n,) whether the two facets of each of ``pairs`` (n, 2) lie in one plane, as layers do.
+
+    The vertices of ``pattern`` are at ``points`` (V, 3); ``near`` is in radians and mean edges.
+    """
+    faces = pattern.faces_vertices
+    normals, middles = facet_normals(points, faces), facet_means(points, faces)
+    one, other = pairs.T
+    level = np.linalg.norm(vector_product(normals[one], normals[other]), axis=1) <= near
+    apart = np.abs(np.einsum("nk,nk->n", middles[other] - middles[one], normals[one]))
+    mean = float(edge_lengths(points, pattern.edges_vertices).mean())
+    return np.asarray(level & (apart <= near * mean))
 
 
 def crossing_triangles(points: Floats, triangles: Ints) -> Ints:

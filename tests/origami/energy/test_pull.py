@@ -19,7 +19,7 @@ from miurafab.origami.energy.pull import pull
 from miurafab.origami.energy.pull_plot import draw_pull
 from miurafab.origami.energy.triangles import facet_triangles
 from miurafab.origami.fitting.fit import FitRequest, fit
-from miurafab.origami.folding.contact import meeting_facets
+from miurafab.origami.folding.contact import meeting_facets, most_meeting, self_intersections
 from miurafab.origami.folding.kinematics import rigid_motion
 from miurafab.origami.piece import pieces_of
 from miurafab.surfaces.catalogue import make_surface
@@ -170,6 +170,13 @@ def test_facets_that_pass_through_each_other_on_the_way_are_told():
     pulled = pull(hypar(), PAPER, strain=0.1, steps=3, cycles=1)
     assert pulled.piercings == 0
     assert through not in pulled.verdict()
+
+
+def test_layers_that_lie_on_each_other_pass_through_nothing():
+    """Of a sheet folded flat it was told that "facets pass through each other on the way"."""
+    closed = kite(math.pi, 30.0, 40.0)
+    assert self_intersections(closed).tolist() == [[0, 1]]
+    assert most_meeting(closed, closed.folded_coords[None]) == 0
 
 
 def test_creases_that_keep_their_rest_leave_no_set():
