@@ -160,11 +160,11 @@ RULES = {
     "program": _check(
         "a line that the controller would answer with an error, or whose effect cannot be told"
     ),
-    "m3": _check("`M3`: the beam stays on wherever motion stops"),
+    "m3": _check("`M3`, or `M4` without laser mode: the beam stays on wherever motion stops"),
     "bounds": _check("a move off the bed"),
     "islands": _check("a stroke inside an outline that is cut through already"),
     "outlines": _check("an outline whose end misses its beginning by a little"),
-    "dwell": _check("a dwell (`G4`) with the beam on"),
+    "dwell": _check("a dwell (`G4`), or without laser mode a pause (`M0`), with the beam on"),
     "power": _check("an S word above the machine's full power"),
     "material": _check("an S word above the `max_power` of the material"),
     "other-beam": _check("a job made for another kind of beam, or for another full power"),

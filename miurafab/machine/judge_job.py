@@ -20,7 +20,7 @@ import numpy as np
 from miurafab.errors import GcodeError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import BEAM_M3, PAUSE, Program
+from miurafab.gcode.program import BEAM_M3, BEAM_M4, PAUSE, Program
 from miurafab.gcode.reading import has_laser_mode, read_program
 from miurafab.geometry.arrays import Bools
 from miurafab.machine.judge_words import (
@@ -213,8 +213,10 @@ def _loose_parts(program: Program) -> Iterator[Finding]:
 
 
 def _dwells(job: Job, program: Program, machine: MachineProfile) -> Iterator[Finding]:
-    burning = _burning_dwells(program)
-    if machine.dialect == "marlin":
+    marlin, laser_mode = machine.dialect == "marlin", has_laser_mode(machine)
+    stays = (BEAM_M3,) if laser_mode else (BEAM_M3, BEAM_M4)
+    burning = _burning_dwells(program, stays, pauses=marlin or not laser_mode)
+    if marlin:
         burning = sorted((dict(dwells_under_m3(job)) | dict(burning)).items())
     if burning:
         line, power = burning[0]
@@ -223,14 +225,17 @@ def _dwells(job: Job, program: Program, machine: MachineProfile) -> Iterator[Fin
             program.name,
             line,
             f"waits with the beam on at S{power:g}, which burns a hole or starts a fire; switch it "
-            "off (M5) before the G4.",
+            "off (M5) first.",
             len(burning),
         )
 
 
-def _burning_dwells(program: Program) -> list[tuple[int, float]]:
+def _burning_dwells(
+    program: Program, stays: tuple[int, ...], *, pauses: bool
+) -> list[tuple[int, float]]:
     """The lines and powers of dwells that burn in place: with the power of the last event, or of
-    the last move under M3 if that came later.
+    the last move if that came later, where its spindle is one that ``stays`` on at rest. GRBL holds
+    in ``pauses``, which puts the beam out in laser mode alone.
     """
     at, power = 0, 0.0
     burning = []
@@ -239,15 +244,16 @@ def _burning_dwells(program: Program) -> list[tuple[int, float]]:
         program.event_seconds,
         program.event_power,
         program.event_line,
+        program.event_kind,
     )
-    for move, seconds, new, line in zip(*(each.tolist() for each in columns), strict=True):
+    for move, seconds, new, line, kind in zip(*(each.tolist() for each in columns), strict=True):
         if move > at:
             at = move
-            still = program.spindle[move - 1] == BEAM_M3
+            still = program.spindle[move - 1] in stays
             power = float(program.power[move - 1]) if still else 0.0
         if new == new:  # NaN: as before
             power = new
-        if power > 0 and seconds > 0:  # a dwell; no other event lasts
+        if power > 0 and (seconds > 0 or (pauses and kind == PAUSE)):  # no other event lasts
             burning.append((line, power))
     return burning
 

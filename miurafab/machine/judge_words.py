@@ -14,18 +14,21 @@ from miurafab.errors import GcodeError
 from miurafab.findings import Finding
 from miurafab.gcode.dialect_words import OUTPUT
 from miurafab.gcode.job import Job, plain_code
+from miurafab.gcode.reading import has_laser_mode
 from miurafab.profiles import MachineProfile
 from miurafab.units import DECIMAL
 
 # Between the letter and the digits of a word may stand blanks, a sign, zeros and comments.
 _GAP = r"(?:[ \t/+0]|\([^)\r\n]*\))*"
 _M3_ANYWHERE = re.compile(rf"[mM]{_GAP}3")
+_M4_ANYWHERE = re.compile(rf"[mM]{_GAP}4")
 _SPINDLE_ANYWHERE = re.compile(rf"[mM]{_GAP}[2345]")
 # The words in a line without comments and blanks.
 _M3 = re.compile(r"M\+?0*3(?:\.\d*)?(?![\d.])")
+_M4 = re.compile(r"M\+?0*4(?:\.\d*)?(?![\d.])")
 _SPINDLE = re.compile(r"M\+?0*(30?|2|4|5)(?:\.\d*)?(?![\d.])")
 _POWER = re.compile(rf"S({DECIMAL})")
-_DWELL = re.compile(r"G0*4(?![\d.])")
+_DWELL = re.compile(r"G0*4(?![\d.])|M0*[01](?![\d.])")
 _MIST_ANYWHERE = re.compile(rf"[mM]{_GAP}7")
 _MIST = re.compile(r"M\+?0*7(?:\.0*)?(?![\d.])")
 _AIR_ANYWHERE = re.compile(rf"[mM]{_GAP}[23789]")
@@ -57,6 +60,15 @@ def constant_beam(job: Job, machine: MachineProfile) -> Iterator[Finding]:
         "arms the laser with M3, which keeps the beam on, standing still, if the link to the "
         "machine is lost; use M4, or allow M3 explicitly and stay beside the machine.",
     )
+    if not has_laser_mode(machine):
+        yield from of_word(
+            "m3",
+            job,
+            (_M4_ANYWHERE, _M4),
+            "arms the laser with M4, which is as M3 without laser mode: it keeps the beam on, "
+            "standing still, if the link to the machine is lost; allow M3 explicitly and stay "
+            "beside the machine.",
+        )
 
 
 def armed_at_the_end(job: Job) -> Iterator[Finding]:
@@ -159,8 +171,8 @@ def _code(line: str) -> str:
 
 
 def dwells_under_m3(job: Job) -> list[tuple[int, float]]:
-    """The dwells while M3 and a power are in force, by the words alone: Marlin without inline
-    mode (``M3`` without ``I``) burns with them at once, whatever the motion mode is.
+    """The dwells and pauses while M3 and a power are in force, by the words alone: Marlin without
+    inline mode (``M3`` without ``I``) burns with them at once, whatever the motion mode is.
     """
     if _M3_ANYWHERE.search(job.text) is None:
         return []

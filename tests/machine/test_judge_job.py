@@ -45,7 +45,16 @@ def codes(text: str, machine: MachineProfile, most_power: float = 1.0) -> list[s
         (LASER, STROKE + "M5\nM0\n", ["pauses"]),
         (LASER, STROKE + "M8\nM5\n", ["air"]),
         (PEN, "M3 S500\nG1 X10 F600\nG4 P1\nM5\n", []),  # a pen that is down stays down
-        (DARK, STROKE + "M5\n", ["laser-mode"]),
+        (DARK, STROKE + "M5\n", ["laser-mode", "m3"]),
+        # Without laser mode M4 is as M3, and neither a dwell nor a pause puts it out.
+        (OLD, STROKE + "G4 P1\nM5\n", ["dwell", "m3"]),
+        (OLD, STROKE + "M0\nM5\n", ["dwell", "m3", "pauses"]),
+        (OLD, STROKE + "M5\nM0\n", ["m3", "pauses"]),
+        (OLD, STROKE + "S0\nM0\nM5\n", ["m3", "pauses"]),
+        (OLD, "M3 S500\nG1 X10 F600\nG0 X20\nM0\nM5\n", ["dwell", "m3", "pauses"]),
+        (LASER, "M3 S500\nG1 X10 F600\nM0\nM5\n", ["m3", "pauses"]),
+        (MARLIN, "M3 S50\nM0 S5\nM5\n", ["dwell", "m3", "nothing-burnt", "pauses"]),
+        (MARLIN, "M3 I\nG1 X9 S50 F600\nM0\nM5\n", ["dwell", "m3", "pauses"]),
     ],
 )
 def test_what_is_found_on_a_limit_and_beyond_it(
@@ -94,7 +103,7 @@ def test_a_line_fits_to_the_byte() -> None:
         (LASER, "M4 S500\nG1 X10 F600\nM3\nX20\nG4 P1\nM5\n", ["dwell", "m3"]),
         (LASER, "M4 S5\nG0 X100\nG1 X110 Y10 F8000\nM5\n", []),  # wherever it is
         (LASER, "M4 S5\nG1 X0.5 F6001\nM5\n", ["rate"]),  # however short
-        (OLD, STROKE + "M5\n", []),  # has no laser mode that could be off
+        (OLD, STROKE + "M5\n", ["m3"]),  # has no laser mode that could be off
         (PLOTTER, "IN;PU0,0;PD" + 500 * "400,0,400,400," + "0,0;\n", []),  # a line of 6500
         (PEN, "M3 S500\nG1 X10 F600\n", []),
         (PEN, STROKE, []),
@@ -115,7 +124,7 @@ M3 = (
     "is lost; use M4, or allow M3 explicitly and stay beside the machine."
 )
 WAITS = "waits with the beam on at S{}, which burns a hole or starts a fire; switch it off (M5) "
-WAITS += "before the G4."
+WAITS += "first."
 
 
 @pytest.mark.parametrize(
@@ -214,6 +223,9 @@ WAITS += "before the G4."
             DARK,
             STROKE + "M5\n",
             [
+                "m3 a.nc:1: a.nc, line 1 arms the laser with M4, which is as M3 without laser "
+                "mode: it keeps the beam on, standing still, if the link to the machine is lost; "
+                "allow M3 explicitly and stay beside the machine.",
                 "laser-mode grbl-laser-400: Laser mode is off on grbl-laser-400 ($32=0): the beam "
                 "would burn along every travel; set $32=1."
             ],
