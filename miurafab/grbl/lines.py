@@ -14,8 +14,8 @@ from miurafab.units import DECIMAL
 
 _SYSTEM = re.compile(rb"\$(?!J)", re.IGNORECASE)
 _SETTING = re.compile(rb"\$(?:N?[-+.\d]+|RST|I)=", re.IGNORECASE)
-_PLACE = re.compile(rb"G0*10(?![\d.])|G0*28\.10*(?!\d)|G0*30\.10*(?!\d)", re.IGNORECASE)
-_DWELL = re.compile(rb"G0*4(?![\d.])", re.IGNORECASE)
+_PLACE = re.compile(rb"G\+?0*(?:10(?:\.0*)?(?![\d.])|(?:28|30)\.10*(?!\d))", re.IGNORECASE)
+_DWELL = re.compile(rb"G\+?0*4(?:\.0*)?(?![\d.])", re.IGNORECASE)
 _DWELL_SECONDS = re.compile(rf"P\+?({DECIMAL})".encode(), re.IGNORECASE)
 
 

@@ -148,6 +148,9 @@ def test_a_question_stands_for_a_missing_banner(resets: bool) -> None:
         "/$32=0",
         "$3/2=0",
         "G1/0L2P1X0",
+        "G10.0L2P1X0",
+        "G+10.L2P1X0",
+        "G+28.1",
     ],
 )
 def test_a_line_that_writes_eeprom_travels_alone(text: str) -> None:
@@ -192,6 +195,9 @@ def test_other_lines_do_not_write_eeprom(text: str) -> None:
         ("G40P1", 0),
         ("/G4P/2", 2.0),
         ("G4P-2", 0),  # refused, and no time comes off what is waited for the others
+        ("G4.0P2", 2.0),
+        ("G+04.P2", 2.0),
+        ("G4.1P2", 0),
         ("G4P.", 0),
         ("G4P1.5.2", 1.5),
     ],
