@@ -100,6 +100,7 @@ RULES = {
     "self-intersection": Rule("refusal", "facets that meet in the folded form"),
     "bow-tie": Rule("refusal", "a facet whose own sides cross"),
     "dented": Rule("warning", "a quad facet that is not convex"),
+    "both-sides": Rule("warning", "a facet that lies on both sides of an edge, and is no polygon"),
     "steep-folds": Rule("warning", "creases that fold by more than 165 degrees"),
     "much-paper": Rule("warning", "a sheet of more than four times the area of the target"),
     "coverage": Rule("warning", "a sheet that covers less than 95 % of the target"),

@@ -152,7 +152,7 @@ def _edges(pattern: CreasePattern) -> Iterator[Finding]:
 
 
 def _facets(pattern: CreasePattern) -> Iterator[Finding]:
-    """Facets that are turned over, and facets that are not those of the grid or of their cells."""
+    """Facets that are turned over or no polygons, or not those of the grid or of their cells."""
     faces = pattern.faces_vertices
     turned = np.flatnonzero(signed_areas(pattern.vertices_coords[filled(faces)]) < 0)
     if len(turned):
@@ -162,6 +162,15 @@ def _facets(pattern: CreasePattern) -> Iterator[Finding]:
             for f in turned
         }
         yield _finding("turned-over", over, "facet")
+    left, right = pattern.edges_faces.T
+    both = {
+        int(edge): f"Facet {left[edge]} lies on both sides of edge {edge}, which ends inside it or "
+        "leads to a window there: it is no polygon, and cannot be laid out on sheets. Join what "
+        "is there to another side of the facet by a flat edge (F), or leave the edge out."
+        for edge in np.flatnonzero((left == right) & (left >= 0))
+    }
+    if both:
+        yield _finding("both-sides", both, "edge")
     if pattern.grid is not None:
         yield from _off_the_grid(faces, QuadGrid(*pattern.grid))
     elif pattern.cells is not None:

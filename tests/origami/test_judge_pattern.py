@@ -453,6 +453,27 @@ def test_shapes_that_no_paper_has_are_told() -> None:
     ]
 
 
+def test_a_facet_on_both_sides_of_an_edge_is_told() -> None:
+    """`sheets` refused it and sent to `check`, which called it sound."""
+    outer, inner = (
+        np.array([[0.0, 0], [3, 0], [3, 3], [0, 3]]),
+        np.array([[1.0, 1], [2, 1], [2, 2]]),
+    )
+    ring = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 4], [0, 4]])
+    pattern = CreasePattern(
+        np.concatenate([outer, inner]),
+        ring,
+        np.array([*"BBBBBBBF"]),
+        np.zeros(8),
+        np.array([[0, 1, 2, 3, 0, 4, 6, 5, 4]]),
+    )
+    assert said(pattern)[0] == (
+        "both-sides: Facet 0 lies on both sides of edge 7, which ends inside it or leads to a "
+        "window there: it is no polygon, and cannot be laid out on sheets. Join what is there to "
+        "another side of the facet by a flat edge (F), or leave the edge out."
+    )
+
+
 def measured(**values: object) -> Measurements:
     return Measurements(facets=1, vertices=4, min_edge_mm=1.0, overlaps=0, **values)
 
