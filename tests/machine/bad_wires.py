@@ -118,7 +118,6 @@ class Trial:
         dice = random.Random(seed)
         self.job = random_job(dice)
         steps = dice.choice((80.0, 80.0, 250.0, 4.0, 2.0))
-        self.coarse = steps < 5
         self.settings = virtual_settings(MACHINE) | {
             10: dice.choice((0, 1, 2, 3)),
             13: dice.choice((0, 0, 1)),
@@ -218,8 +217,9 @@ class Trial:
         assert not device.beam_on, (self.seed, str(error))
         kinds = {fault.kind for fault in self.faults} if faulty else set()
         # A firmware that stops in mid-move may wait its step idle delay ($1) with the beam on: in a
-        # hang, and where a hold ends between two steps of a coarse motor.
-        stops = bool(kinds & {"hang", "stall"}) + (len(self.blows) if self.coarse and faulty else 0)
+        # hang, and where a hold, of somebody or before the reset, ends between two steps.
+        holds = len(self.blows) + (error is not None) if faulty else 0
+        stops = bool(kinds & {"hang", "stall"}) + holds
         most = 0.026 * stops
         assert standing_seconds(device.beam_log) <= most, (self.seed, str(error))
         lengths: Counter[tuple[int, int]] = Counter()
