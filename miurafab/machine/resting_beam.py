@@ -13,6 +13,7 @@ Lines that are no program light it too (``system.c``, ``stepper.c``):
 * ``$32=0`` lights nothing at once, but the blocks of the next reset.
 * ``$RST=`` ends in a reset, and so does the ``$C`` that ends the check mode. ``$RST=$`` and
   ``$RST=*`` bring back the firmware's own ``$32``, which is 0 in GRBL; ``*`` clears the blocks.
+* With ``$31`` not below ``$30`` each S is full power, S0 too, and an armed beam is on in any mode.
 * A jog moves with the beam that is armed, and leaves it on behind it, unless that is ``M4`` in
   laser mode.
 
@@ -23,8 +24,9 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from miurafab.errors import GcodeError
 from miurafab.gcode.block_errors import BlockError
@@ -44,9 +46,11 @@ _JOG = "G1"  # as far as the beam goes that a jog leaves on
 Words = list[tuple[str, float]]
 
 
-def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> float:
+def resting_power(
+    words: Iterable[tuple[str, float]], *, laser_mode: bool, only: float | None = None
+) -> float:
     """The S with which the beam is on at rest after ``words``, letters with numbers, the modes in
-    force first; 0 where it is off.
+    force first; 0 where it is off. ``only`` is the S that each S is, if there is no other.
 
     >>> resting_power([("M", 3), ("S", 1000)], laser_mode=False)
     1000.0
@@ -62,6 +66,8 @@ def resting_power(words: Iterable[tuple[str, float]], *, laser_mode: bool) -> fl
         elif letter == "G" and (number in (0, *_BURNING, 80) or 38 <= number < 39):
             motion = number
     armed = spindle in (3, 4)
+    if armed and only is not None:
+        return only
     if laser_mode:
         armed = spindle == 3 and motion in _BURNING
     return speed if armed else 0.0
@@ -110,10 +116,14 @@ class RestingBeam:
         state, known = self._known.state, self._known
         if state.modes:
             self._since.clear()  # else the controller does not tell them while it moves
-        laser_mode = bool(known.settings.values.get(_LASER_MODE))
+        values = known.settings.values
+        laser_mode, least, most = bool(values.get(_LASER_MODE)), values.get(31, 0.0), values.get(30)
+        only = None if most is None or least < most else max(most, 1.0)
         before = [word for mode in (*known.modes.modes, *self._since) for word in _words(mode)]
-        burns = 0.0 if state.beam_off else resting_power(before, laser_mode=laser_mode)
-        lit = _lit(read, before, known.modes.startup, laser_mode, checks=state.state == "Check")
+        lights = partial(resting_power, only=only)
+        burns = 0.0 if state.beam_off else lights(before, laser_mode=laser_mode)
+        checks = state.state == "Check"
+        lit = _lit(read, before, known.modes.startup, laser_mode, checks=checks, lights=lights)
         if lit.now <= burns and lit.later == 0.0:
             return
         self._held = line
@@ -127,14 +137,20 @@ class RestingBeam:
 
 
 def _lit(
-    read: str, before: Words, startup: Mapping[int, str], laser_mode: bool, *, checks: bool
+    read: str,
+    before: Words,
+    startup: Mapping[int, str],
+    laser_mode: bool,
+    *,
+    checks: bool,
+    lights: Callable[..., float],
 ) -> _Lit:
     """What is lit by a line, behind the words ``before`` and with the blocks ``startup``;
-    ``checks``: the controller is in check mode.
+    ``checks``: the controller is in check mode. ``lights`` is :func:`resting_power` there.
     """
 
     def power(words: Iterable[tuple[str, float]], laser_mode: bool = laser_mode) -> float:
-        return resting_power(words, laser_mode=laser_mode)
+        return lights(words, laser_mode=laser_mode)
 
     def start(blocks: Mapping[int, str]) -> Words:
         return [word for number in sorted(blocks) for word in _words(blocks[number])]

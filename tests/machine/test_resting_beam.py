@@ -297,6 +297,20 @@ def test_a_job_that_homes_first_begins_in_known_modes() -> None:
     assert wire.device.beam_log == []
 
 
+@pytest.mark.parametrize("line", ["M4", "M3S0", "$N0=M4", "G1F100M4S1"])
+@pytest.mark.parametrize("range_", ["$31=1000", "$30=0"])
+def test_what_arms_is_held_back_where_each_s_is_full_power(range_: str, line: str) -> None:
+    """S0 too, in laser mode, at rest (``spindle_compute_pwm_value`` of ``spindle_control.c``)."""
+    session, wire = here(laser_mode=True)
+    assert all(is_sent(session, wire, each) for each in (line, "M5", "$N0=", range_))
+    assert not is_sent(session, wire, line)
+    assert not wire.device.beam_on
+    assert is_sent(session, wire, line)
+    assert wire.device.beam_on
+    assert session.close()
+    assert not wire.device.beam_on
+
+
 @pytest.mark.parametrize(
     ("laser_mode", "armed", "lights"),
     [(True, "M3S500", True), (True, "M4S500", False), (False, "", False), (True, "M5S500", False)],
