@@ -10,6 +10,7 @@ from miurafab.cli.console import Console, readable
 from miurafab.cli.declared import argument, option, takes
 from miurafab.errors import DONE, NO
 from miurafab.files import new_file
+from miurafab.findings import counted
 from miurafab.options import File, Text
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def _unfolded(answer: dict[str, Any]) -> dict[str, Any]:
 
 def _pulled(answer: dict[str, Any]) -> dict[str, Any]:
     """The figures of a pull with names and units for a person."""
-    (one, other), left = answer["pulled"], answer["set_mm"]
+    (one, other), left, through = answer["pulled"], answer["set_mm"], answer["piercings"]
     facts: dict[str, Any] = {
         "Converged": answer["converged"],
         "Pulled": f"vertices {one} and {other}, {answer['distance_mm']:.1f} mm apart, by "
@@ -145,7 +146,7 @@ def _pulled(answer: dict[str, Any]) -> dict[str, Any]:
         "Force": f"{answer['force_n']:.3g} N, {answer['largest_force_n']:.3g} N at most",
         **({} if left is None else {"Stays longer by": f"{round(left, 6) + 0.0:.3g} mm"}),
         "Creases that yield": f"{100 * answer['yielded']:.3g} %",
-        "Facets that cross": f"{answer['piercings']} pairs" if answer["piercings"] else "none",
+        "Facets that cross": counted(through, "pair", "pairs") if through else "none",
         "Material": f"{answer['thickness_mm']:.3g} mm thick, modulus "
         f"{answer['modulus_pa'] / 1e9:.3g} GPa, crease length {answer['crease_length_mm']:.3g} mm",
     }

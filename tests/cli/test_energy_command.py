@@ -11,6 +11,7 @@ from command_line import sentence
 from piece_problems import two_pieces
 from problems import regular
 
+from miurafab.cli.energy import _pulled
 from miurafab.errors import InputError
 from miurafab.origami.energy.plot import energy_table
 from miurafab.origami.fitting.fit import FitRequest, fit
@@ -120,6 +121,8 @@ def test_a_pull_is_told_in_newtons(run, saved, hypar, tmp_path):
     top = max(rows, key=lambda row: float(row["extension_mm"]))
     assert float(top["extension_mm"]) == pytest.approx(0.1 * answer["distance_mm"])
     assert {row["way"] for row in rows} == {"out", "back"}
+    crossing = [_pulled(answer | {"piercings": n})["Facets that cross"] for n in range(3)]
+    assert crossing == ["none", "1 pair", "2 pairs"]
     done = run("energy", saved, *asked, "-o", tmp_path / "pull.svg")
     assert " N pull it to a strain of 0.1" in done.stdout
     assert (tmp_path / "pull.svg").read_bytes().startswith(b"<?xml")
