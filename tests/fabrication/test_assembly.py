@@ -11,18 +11,18 @@ from miurafab.fabrication.assembly import assembly_order
 from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.sheets import lay_out
 
+FAN = flat_patterns.fan(24, 20, radius=150.0)
 CASES = {
-    "miura": miura(20, 16),
-    "fan": flat_patterns.fan(24, 20, radius=150.0),
-    "fan without grid": without_grid(flat_patterns.fan(24, 20, radius=150.0)),
-    "triangles": triangles(3, 11, 360.0),
+    "miura": (miura(12, 10), (70.0, 60.0)),
+    "fan": (FAN, (130.0, 100.0)),
+    "fan without grid": (without_grid(FAN), (130.0, 100.0)),
+    "triangles": (triangles(3, 11, 360.0), (160.0, 130.0)),
 }
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_what_is_assembled_stays_a_disk(name):
-    pattern = CASES[name]
-    size = (150.0, 120.0) if name == "triangles" else (120.0, 100.0)
+    pattern, size = CASES[name]
     layout = lay_out(pattern, bed(*size), card())
     steps = assembly_order(layout, pattern)
     assert len(steps) == len(layout.patches) > 6
