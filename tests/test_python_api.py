@@ -38,8 +38,8 @@ def _in_a_folder(tmp_path, monkeypatch):
 
 def test_the_calls_of_the_interface():
     """As README has them, with fewer facets."""
-    sheet = mf.fit("hypar", height=0.5, facets=(12, 12), size=150)
-    assert (sheet.status, sheet.advice, sheet.report()["facets"]) == ("converged", "", 144)
+    sheet = mf.fit("hypar", height=0.5, facets=(8, 8), size=120)
+    assert (sheet.status, sheet.advice, sheet.report()["facets"]) == ("converged", "", 64)
     sheet.pattern.save("hypar.fold")
     pattern = mf.load("hypar.fold")
     assert mf.check(pattern).valid
