@@ -47,7 +47,7 @@ def assert_mountains_and_valleys(pattern: CreasePattern) -> None:
 
 @cache
 def fitted(
-    name: str, columns: int = 12, rows: int = 12, flat_foldable: float | None = None
+    name: str, columns: int = 8, rows: int = 8, flat_foldable: float | None = None
 ) -> FitResult:
     """A named surface with its default parameters, 200 mm long."""
     surface, parameters = make_surface(name, {})

@@ -16,7 +16,7 @@ from miurafab.options import File
 
 EXAMPLES = (
     "miurafab tradeoff hypar --sides 4,6,8",
-    "miurafab tradeoff saddle.stl --sides 4,6,8 --polish off -o tradeoff.csv",
+    "miurafab tradeoff saddle.stl --sides 4,5,6 --polish off -o tradeoff.csv",
 )
 
 

@@ -21,7 +21,7 @@ from miurafab.fabrication.toolpath import Toolpath
 from miurafab.profiles import OPERATIONS
 
 CUT, PERFORATE = OPERATIONS.index("cut"), OPERATIONS.index("perforate")
-MACHINE = bed(220.0, 160.0)
+MACHINE = bed(210.0, 160.0)
 CASES = {
     "one patch": miura(10, 8),
     "miura": miura(20, 16),

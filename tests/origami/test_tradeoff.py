@@ -23,7 +23,7 @@ from miurafab.origami.tradeoff import Sample, Tradeoff, cost, optimal_side, summ
 from miurafab.origami.tradeoff_plot import SIZE, draw_tradeoff, tradeoff_table
 from miurafab.workflow.tradeoff import _deaf_children
 
-SIDES = (6, 8, 12)
+SIDES = (6, 8, 10)
 
 
 def made(sides, c=0.5, a=1.7, b=-0.2, failed=()) -> list[Sample]:
@@ -170,7 +170,7 @@ def test_the_files(hypar, tmp_path):
     assert text == (tmp_path / "b.csv").read_text()
     lines = [line.split(",") for line in text.splitlines()]
     assert lines[0][:4] == ["facets", "columns", "rows", "status"]
-    assert [line[0] for line in lines[1:]] == ["36", "64", "144"]
+    assert [line[0] for line in lines[1:]] == ["36", "64", "100"]
     assert {len(line) for line in lines} == {9 + len(hypar.curves)}
     pytest.importorskip("matplotlib")
     for kind, start in (("png", b"\x89PNG"), ("svg", b"<?xml")):
@@ -200,7 +200,7 @@ def test_the_numbers_on_an_axis_do_not_overlap(sides):
 
 def test_the_command(run, tmp_path, hypar):
     out = tmp_path / "t.csv"
-    arguments = ["tradeoff", "hypar", "--sides", "6,8,12", "--workers", "1", "-o", str(out)]
+    arguments = ["tradeoff", "hypar", "--sides", "6,8,10", "--workers", "1", "-o", str(out)]
     result = run(*arguments, "--json", "--weights", "0.5")
     assert result.returncode == 0, result
     answer = json.loads(result.stdout)

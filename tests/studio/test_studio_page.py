@@ -89,13 +89,13 @@ def test_from_a_surface_to_sheets_by_keyboard(page, address):
     page.press("Enter")
     page.until("!document.getElementById('fault').hidden")
     assert "'Facets' is '8x'" in page.text("fault")
-    page.type("facets", "12x12")
+    page.type("facets", "8x8")
     assert page.run("document.getElementById('fault').hidden")
     page.press("Enter")
     page.until("!document.getElementById('pattern').hidden")
     page.idle()
     assert "folds from flat paper" in page.text("headline")
-    command = "miurafab fit vase:angle=100 --facets 12x12 --size 200mm -o vase.fold"
+    command = "miurafab fit vase:angle=100 --facets 8x8 --size 200mm -o vase.fold"
     assert page.text("pattern-command") == command
     assert "Flat facets" in page.text("figures")
     folding = page.run("document.getElementById('space').getAttribute('src')")

@@ -43,13 +43,13 @@ DATA = Path(__file__).parent.parent / "data"
 
 
 def exact(name: str) -> CreasePattern:
-    found = fitted(name, 10, 10, 0.0).pattern
+    found = fitted(name, 8, 8, 0.0).pattern
     assert found is not None
     return found
 
 
 def developable(name: str) -> CreasePattern:
-    found = fitted(name, 10, 10).pattern
+    found = fitted(name, 8, 8).pattern
     assert found is not None
     return found
 

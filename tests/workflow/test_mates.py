@@ -25,7 +25,7 @@ from miurafab.workflow.preview import preview
 def shells():
     """A cut through a height field, a ring that closes on itself, and two copies of a model."""
     open_shell = miurafab.fit("hypar", facets=(4, 4), size=260).pattern
-    ring = miurafab.fit("vase", facets=(8, 4), size=120, angle="360deg").pattern
+    ring = miurafab.fit("cylinder", facets=(4, 6), size=120, close="seam").pattern
     yield "cut", open_shell, {"max_patch": "150mmx150mm"}
     yield "ring", ring, {"max_patch": "150mmx150mm"}
     yield "copies", open_shell, {"max_patch": "180mmx180mm", "quantity": 2}

@@ -26,7 +26,7 @@ CASES = {
     "fan": flat_patterns.fan(24, 18, radius=250.0),
     "triangles": triangles(3, 11, 390.0),
 }
-MACHINE = bed(220.0, 160.0)
+MACHINE = bed(210.0, 160.0)
 
 
 @pytest.fixture(scope="module", params=CASES)
