@@ -339,7 +339,7 @@ def test_ends_that_are_not_congruent_are_refused_by_how_far_they_are_apart():
         open_ring(pattern, 0, 3)
 
 
-@pytest.mark.parametrize("size", [(1200.0, 900.0), (190.0, 140.0)], ids=["whole", "patches"])
+@pytest.mark.parametrize("size", [(1200.0, 900.0), (260.0, 200.0)], ids=["whole", "patches"])
 @pytest.mark.parametrize("side", ["lower", "alternate"])
 @pytest.mark.parametrize("name", ["ring", "tube", "irregular tube", "tube along its columns"])
 def test_every_crease_of_an_opened_ring_is_made_once_and_every_tab_glued(name, size, side):

@@ -16,8 +16,8 @@ from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.wording import in_order, runs
 
 CASES = {
-    "miura": (lambda: miura(16, 14, 14.0, 14.0), bed(190.0, 140.0), {}),
-    "fan": (lambda: flat_patterns.fan(18, 14, cell=14.0, radius=250.0), bed(190.0, 140.0), {}),
+    "miura": (lambda: miura(16, 14, 14.0, 14.0), bed(200.0, 150.0), {}),
+    "fan": (lambda: flat_patterns.fan(18, 14, cell=14.0, radius=250.0), bed(260.0, 200.0), {}),
     "tube": (tube, bed(400.0, 400.0), {}),
     "ring": (lambda: revolved("4x8", "140mm"), bed(400.0, 400.0), {}),
     "gores": (gores, bed(400.0, 400.0), {"border_tabs": "all"}),

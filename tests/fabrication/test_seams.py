@@ -22,7 +22,7 @@ from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tabs import inset_of
 
 CASES = {"ring": lambda: revolved("6x16", "220mm"), "tube": tube}
-BEDS = {"one patch": (1200.0, 900.0), "several": (190.0, 140.0)}
+BEDS = {"one patch": (1200.0, 900.0), "several": (220.0, 160.0)}
 
 
 @pytest.fixture(scope="module", params=CASES)

@@ -192,8 +192,14 @@ def test_slits_open_as_far_as_the_solids_beside_them() -> None:
     assert widest > 5.0
 
 
+@cache
+def loose() -> ThickPlates:
+    """Eight by eight facets, which take four loose patches."""
+    return thick_plates(exact("hypar", 8), 2.0)
+
+
 def test_loose_patches_are_made_where_slits_do_not_help() -> None:
-    made = thick_plates(exact("hypar", 8), 2.0)
+    made = loose()
     assert len(made.patches) == 4
     facets = np.concatenate([patch.facets for patch in made.patches])
     assert sorted(facets.tolist()) == list(range(64))
@@ -209,8 +215,7 @@ def test_loose_patches_are_made_where_slits_do_not_help() -> None:
 
 def test_loose_patches_are_joined_in_the_folded_form() -> None:
     """How far their edges are apart there, with each patch laid onto the folded form by itself."""
-    pattern = exact("hypar", 8)
-    made = thick_plates(pattern, 2.0)
+    pattern, made = exact("hypar", 8), loose()
     assert pattern.folded_coords is not None
     where: dict[tuple[int, int], np.ndarray] = {}
     for patch in made.patches:
@@ -246,10 +251,11 @@ def test_a_loose_patch_may_be_slit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sheet that is too large to be tried whole is one loose patch here, with its slit."""
     whole = thick_plates(exact("hypar", 6), 2.0)
     monkeypatch.setattr(plates_module, "WHOLE", 35)
-    (patch,) = thick_plates(exact("hypar", 6), 2.0).patches
+    made = thick_plates(exact("hypar", 6), 2.0)
+    (patch,) = made.patches
     assert np.array_equal(patch.axis_mm, whole.patches[0].axis_mm)
     assert np.array_equal(patch.edges, whole.patches[0].edges)
-    assert thick_plates(exact("hypar", 6), 2.0).seams == whole.seams
+    assert made.seams == whole.seams
     assert [seam.patch for seam in whole.seams] == [0]
 
 
