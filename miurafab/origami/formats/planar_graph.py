@@ -80,21 +80,25 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
         raise PatternError("The drawing holds no line.")
     if not (np.abs(lines.ends) < FARTHEST).all():
         raise too_far()
-    lines, drawn = corners_at_ends(lines), None
-    try:
-        near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
-        sides = split_lines(lines, near)
-        drawn = _joined(lines, sides)
-        if drawn.has_parts_at_ends:
-            _joined(lines, sides, cut_off=True)
-    except LoosePartsError as fault:
-        if len(fault.bridges):
-            lines = with_flat_lines(lines, fault.bridges)
+    lines, loose = corners_at_ends(lines), 0
+    for again in (True, True, False):  # once for loose parts, and once for those at ends of lines
+        drawn = None
+        try:
             near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
-            drawn = _joined(lines, split_lines(lines, near))
-            told += (told_of_loose_parts(fault.parts),)
-        elif drawn is None:
-            raise
+            sides = split_lines(lines, near)
+            drawn = _joined(lines, sides)
+            if drawn.has_parts_at_ends:
+                _joined(lines, sides, cut_off=True)
+        except LoosePartsError as fault:
+            if again and len(fault.bridges):
+                lines, loose = with_flat_lines(lines, fault.bridges), loose + fault.parts
+                continue
+            if drawn is None:
+                raise
+        break
+    assert drawn is not None
+    if loose:
+        told += (told_of_loose_parts(loose),)
     if lines.curve is None:
         return replace(drawn.pattern, told=drawn.pattern.told + told)
     bent = rulings(drawn.pattern, lines.curve[drawn.source] >= 0)

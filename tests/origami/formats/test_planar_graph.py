@@ -174,6 +174,15 @@ def test_a_line_to_a_window_leaves_polygons(letter: str) -> None:
     assert len(parse_fold(document).faces_vertices) == 3
 
 
+def test_a_loose_window_beside_one_that_a_line_joins_leaves_polygons() -> None:
+    """The loose one was joined, and the facet still lay on both sides of the line to the other."""
+    windows = [line for x in (0.5, 1.5) for line in ring("B", x, x, 0.2, 4)]
+    found = pattern_from_lines(drawn(*SQUARE, *windows, ("F", 0.5, 0.7, 0.5, 2)))
+    assert not (found.edges_faces[:, 0] == found.edges_faces[:, 1]).any()
+    (told,) = [finding for finding in found.told if finding.code == "loose-parts"]
+    assert told.sentence.startswith("2 parts of the drawing lie loose inside a facet")
+
+
 def test_windows_side_by_side_leave_polygons() -> None:
     windows = [line for x in (0.4, 1.0, 1.6) for line in ring("B", x, 1, 0.2, 12)]
     found = pattern_from_lines(drawn(*SQUARE, *windows))
