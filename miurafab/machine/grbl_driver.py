@@ -236,13 +236,12 @@ class GrblDriver(StreamDriver):
         if self._stopped_at is None:
             self._stopped_at = self._listened
         stopped, name = self._listened - self._stopped_at, self.plan.job.name
-        patience = ANSWER_S + self._streamer.dwell_in_flight
-        late = self._late_pause() if _rests(report) and stopped > patience else None
+        late = self._late_pause() if _rests(report) and stopped > ANSWER_S else None
         if late is not None:
             first = self._session.connection.in_flight[0].number
             raise ControllerError(
                 f"The controller waits at line {late} of {name} (M0) but has not answered line "
-                f"{first} before it for {patience:g} s: bytes were lost on the way, so look at the "
+                f"{first} before it for {ANSWER_S:g} s: bytes were lost on the way, so look at the "
                 "cable and the baud rate."
             )
         if stopped > _HELD_S and self.plan.at_pause != "wait":

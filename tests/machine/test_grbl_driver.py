@@ -663,6 +663,18 @@ def test_who_is_at_the_keys_may_hold_as_long_as_it_takes(monkeypatch: pytest.Mon
     assert wire.now() > 30
 
 
+def test_what_a_key_holds_lasts_until_a_key_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where nobody was expected."""
+    monkeypatch.setattr("miurafab.machine.grbl_driver._HELD_S", 10.0)
+    job = Job("held.nc", "M4 S0\nG1 X20 S500 F300\nM5\n")
+    wire = new_wire()
+    keys = Pressed(wire, 2.0, " ")
+    pressed_at_the_machine(wire, (30.0, b"~"))
+    plan = replace(plan_job(job, MACHINE), at_pause="stop")
+    deliver(plan, wire, StopSignals(), keys=keys)
+    assert wire.now() > 30
+
+
 def test_a_pause_is_known_on_a_machine_of_few_steps() -> None:
     """Of 2 steps a mm it comes to X20.5 or X20 where the program says X20.2."""
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE) | {100: 2.0, 101: 2.0}, baud=115_200))

@@ -422,3 +422,36 @@ def test_a_beam_that_a_start_lights_is_put_out_when_the_port_is_left(block: str)
     assert again.close()
     wire.device.advance(5.0)
     assert not wire.device.beam_on
+
+
+def test_what_a_start_lights_behind_a_wait_is_known_when_the_line_is_done() -> None:
+    """So that a session that is closed then puts it out."""
+    session, wire = here(laser_mode=False)
+    assert is_sent(session, wire, "$N0=G4P2")
+    for line in ("$N1=M3S500", "$N1=M3S500", "M5", "$RST=#", "$RST=#"):
+        is_sent(session, wire, line)
+    assert session.state.beam_on
+    assert session.close()
+    wire.device.advance(5.0)
+    assert not wire.device.beam_on
+
+
+def test_a_locked_controller_runs_no_startup_block_and_is_known_dark() -> None:
+    session, wire = here(laser_mode=True, **{f"_{n}": value for n, value in HOMING.items()})
+    session.unlock()
+    session.say("$N0=M3S500")
+    wire.device.power_cycle()
+    again = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    assert again.open().state == "Alarm"
+    assert again.abort()
+
+
+def test_a_move_goes_on_after_no_job_that_could_not_begin(tmp_path: Path) -> None:
+    session, wire = here(laser_mode=True)
+    session.say("G1 X90 F300")
+    with pytest.raises(MiurafabError, match="journal"):
+        session.cut(plan_job(Job("a.nc", "G0 X9\n"), MACHINE), journal_path=tmp_path)
+    assert session.close()
+    at = wire.device.position
+    wire.device.advance(5.0)
+    assert wire.device.position == at
