@@ -272,6 +272,15 @@ class GrblDriver(StreamDriver):
                 return line.number
         return None
 
+    @property
+    def _moves(self) -> bool:
+        """Whether a change of the power reaches the moves: at rest GRBL sets the beam by it. A
+        dwell may have begun since the last report.
+        """
+        report = self._session.status
+        rests = report is None or report.state == "Idle" or self._streamer.dwell_in_flight > 0
+        return not rests
+
     @cached_property
     def _names_other_places(self) -> bool:
         return _OTHER_PLACES.search(self.plan.job.text) is not None
@@ -285,7 +294,7 @@ class GrblDriver(StreamDriver):
         if not session.connection.writing_eeprom:
             orders, self.orders = self.orders, []
             for order in orders:
-                if order in POWER and self._burns_at_rest and not _moves(session.status):
+                if order in POWER and self._burns_at_rest and not self._moves:
                     self.orders.append(order)
                     continue
                 if order == HOLD and self._burns_in_hold:
@@ -365,11 +374,6 @@ class GrblDriver(StreamDriver):
         program = self.plan.program
         laser = self.plan.machine.tool.kind == "laser"
         return laser and (program is None or bool((program.spindle == BEAM_M3).any()))
-
-
-def _moves(report: StatusReport | None) -> bool:
-    """Whether a change of the power reaches the moves: at rest GRBL sets the beam by it."""
-    return report is not None and report.state != "Idle"
 
 
 def _rests(report: StatusReport | None) -> bool:

@@ -413,6 +413,18 @@ def test_a_key_that_changes_the_power_of_m3_waits_until_the_axes_move() -> None:
     assert max(segment.power for segment in wire.device.beam_log) == pytest.approx(0.55, abs=0.01)
 
 
+def test_a_key_that_changes_the_power_waits_for_a_dwell_that_no_report_has_told() -> None:
+    """The beam burnt one spot for the whole dwell, if the key came in its first fifth of a second;
+    the dwell begins at 0.96 s here.
+    """
+    job = Job("dwell.nc", "M3 S0\nG1 X5 S500 F600\nG0 X30\nG4 P3\nG1 X40 F600\nG0 X0\nM5\n")
+    wire = new_wire()
+    plan = plan_job(job, MACHINE, SendOptions(allow_m3=True))
+    deliver(plan, wire, StopSignals(), keys=Pressed(wire, 1.0, "]"))
+    assert wire.commands.count(b"\x9a") == 1
+    assert standing_seconds(wire.device.beam_log) < 0.03
+
+
 class Pressed:
     """A key, pressed once when so many seconds have passed."""
 
