@@ -34,8 +34,6 @@ FARTHEST = 0.9
 """The part of half a turn up to which creases go: on each other, facets have no one balance."""
 FIRST_PARTS = (1.0, 0.25, 1.0 / 16.0)
 """The first balance, in steps between two frames: nearer to flat if it is not found."""
-MOST_STAYS = 3
-"""Frames in which a saddle is tried to be left; those that follow will not leave it, either."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ def fold_from_flat(
 
     walk = RampWalk(model, near, np.random.default_rng(seed), tell)
     start = linear_seed(model)
-    nominal, stuck, stays = float(parts[1]) / finer, 0, 0
+    nominal, stuck = float(parts[1]) / finer, 0
     found = any(walk.leave_flat(start.heights, nominal * first) for first in FIRST_PARTS)
     for number, part in enumerate(parts[1:].tolist()):
         found = found and walk.reach(part, nominal)
@@ -118,13 +116,10 @@ def fold_from_flat(
             break
         frame = walk.frame()
         if frame.unstable > stuck:
-            stays += 1
             if walk.leave_saddle():
                 frame = walk.frame()
-            elif stays >= MOST_STAYS:
+            else:  # nor will it leave those that follow
                 stuck = frame.unstable
-        if not frame.unstable:
-            stays = 0
         stuck = min(stuck, frame.unstable)
         frames.append(frame)
         if on_progress is not None:

@@ -48,8 +48,7 @@ ROUNDS = 200
 MOST_ARMINGS = 5
 """How often a step is solved anew with springs between what came to touch in it."""
 MOST_FACTORS = 4
-"""How many factorisations Newton's iteration gets after a descent, and where facets may touch
-before one."""
+"""How many factorisations Newton's iteration gets where facets may touch, before a descent."""
 ARMED = 0.1
 """Mean edges within which a pair has its spring from the beginning of a step."""
 LEASH = REACH - HEIGHT
@@ -226,8 +225,7 @@ class RampWalk:
     def _land(self, points: Floats, part: float) -> bool:
         """Find a balance at ``part`` by descent from ``points``."""
         ended = self._descend(points, part)
-        start = self._soft.state(ended.points)
-        found = self._solved(self._soft, start, part, factors=MOST_FACTORS)
+        found = self._solved(self._soft, self._soft.state(ended.points), part)
         turned = np.abs(self._soft.angles(found.state.points) - self._soft.last)
         if not found.converged or turned.max(initial=0.0) > LARGEST_TURN:
             return False
