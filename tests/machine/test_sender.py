@@ -510,7 +510,9 @@ def test_a_machine_with_homing_is_homed_first_if_asked() -> None:
     plan = plan_job(job, MACHINE, SendOptions(force=force, home=True))
     wire = FakeWire(new_device(**homing))
     assert deliver(plan, wire, StopSignals()).lines == 2
-    assert wire.commands.startswith(ASKED + AS_WRITTEN + b"$H\n" + MODES + b"G90\n")
+    # Behind the homing the firmware runs its startup blocks, so its modes are asked for again.
+    homed = b"$H\n" + b"$#\n$G\n"
+    assert wire.commands.startswith(ASKED + AS_WRITTEN + homed + MODES + b"G90\n")
     assert wire.device.position[0] == pytest.approx(-5)
 
 

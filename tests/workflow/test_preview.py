@@ -126,7 +126,8 @@ def test_m2_disarms_and_g40_is_no_dwell():
 
 def test_laser_mode_off_is_a_hazard_for_lasers_only():
     off = replace(LASER, settings={**LASER.settings, 32: 0.0})
-    assert codes(CLEAN, off) == ["laser-mode"]
+    assert codes(CLEAN, off) == ["m3", "laser-mode"]  # M4 is as M3 there
+    assert codes(CLEAN.replace("M4", "M3"), LASER) == ["m3"]
     pen = replace(off, tool=replace(off.tool, kind="pen"))
     assert run(CLEAN.replace("M4", "M3"), pen).warnings == ()
 
