@@ -34,7 +34,7 @@ from miurafab.machine.preflight import (
     raise_findings,
 )
 from miurafab.machine.progress import JobAborted
-from miurafab.machine.stream_driver import JobContext, StreamDriver
+from miurafab.machine.stream_driver import JobContext, StreamDriver, nobody_there, waiting_at
 
 WAS_RESET = "the controller was reset and reports the beam off"
 NOT_CONFIRMED = (
@@ -190,15 +190,11 @@ class GrblDriver(StreamDriver):
         line = owed[0].number  # GRBL answers M0 when its hold is over, and all before it earlier
         if self._is_at_pause(program, line) is False:
             return None
-        where = f"{self.plan.job.name}, line {line}"
         if self.plan.at_pause == "stop":
-            raise PersonNeeded(
-                f"{where} waits for a person (M0), and nobody is at the keys; `resume` the job in "
-                "a terminal, or leave the pauses out"
-            )
+            raise nobody_there(self.plan.job.name, line, "`resume` the job")
         if self.plan.at_pause == "go on":
             self.orders.append(RESUME)
-        return f"waiting at {where} (M0): r goes on"
+        return waiting_at(self.plan.job.name, line)
 
     def _is_at_pause(self, program: Program, line: int) -> bool | None:
         """Whether the head stands where the pause of ``line`` comes: a hold of somebody at the

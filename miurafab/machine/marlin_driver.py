@@ -14,11 +14,14 @@ M112 shuts the beam and the motors; an air assist stays on (Marlin 2.1: ``minkil
 and only ``M9`` or a reset shuts the pin of ``AIR_ASSIST``), so the last words say that.
 
 Marlin has no feed hold: the driver pauses by sending nothing more, and the machine still makes the
-moves that it has planned.
+moves that it has planned. So it does at ``M0`` and ``M1``, once all motion has ended. The
+controller gets neither: it would wait for its own button or ``M108`` without end, and a board
+without display and ``EMERGENCY_PARSER`` does not know them (Marlin 2.1: ``M0_M1.cpp``).
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 
 from miurafab.errors import ControllerError, MiurafabError, PortError
@@ -28,7 +31,7 @@ from miurafab.machine.greeting import ANSWER_S
 from miurafab.machine.judge_job import longest_line
 from miurafab.machine.judge_words import air_after, leaves_air_on
 from miurafab.machine.session import HOMING_S
-from miurafab.machine.stream_driver import JobContext, StreamDriver
+from miurafab.machine.stream_driver import JobContext, StreamDriver, nobody_there, waiting_at
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import Transport
 from miurafab.marlin.connection import EMERGENCY, MarlinConnection
@@ -42,6 +45,7 @@ NOT_CONFIRMED = (
 SET = (b"G21", b"G90")
 """mm and absolute moves, as after power-up: a board that was not reset keeps its last modes."""
 AIR_IS_ON = ", and the air stays on: shut it at the machine"
+_PAUSE = re.compile(rb"M0*[01](?![\d.])")
 _LOOK_S = 0.05  # between two reads of the keys
 _SILENCES = 3  # the line is sent again after each silence but the last
 _KILL_S = 0.8  # from M112 to its answer
@@ -62,6 +66,7 @@ class MarlinDriver(StreamDriver):
         self._taken = 0
         self._last = 0
         self._air = False
+        self._waits = ""
 
     @property
     def acknowledged(self) -> int:
@@ -77,16 +82,40 @@ class MarlinDriver(StreamDriver):
         """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
         wire = self._wire
         for line in self._lines():
-            while self.held:
-                self.attend_and_tell()
-                wire.receive(_LOOK_S)
-            self._air = air_after(line.data, self._air)
-            wire.send(line, self.attend_and_tell, self._where)
+            self._rest_while_held()
+            if _PAUSE.match(line.data):
+                self._pause(line)
+            else:
+                self._air = air_after(line.data, self._air)
+                wire.send(line, self.attend_and_tell, self._where)
             self._taken, self._last = self._taken + 1, line.number
             self.attend_and_tell()
         air = (b"M9",) if leaves_air_on(self.plan.job) else ()
         for code in (b"M400", b"M5", *air):
             wire.send(SendLine(0, code), self.attend_and_tell, self._where)
+
+    def _rest_while_held(self) -> None:
+        while self.held:
+            self.attend_and_tell()
+            self._wire.listen(_LOOK_S, self._where)
+
+    def _pause(self, line: SendLine) -> None:
+        """Do what the plan says where the program waits for a person, in place of the controller.
+
+        Raises :class:`~miurafab.errors.PersonNeeded` if nobody is there.
+        """
+        self._wire.send(SendLine(0, b"M400"), self.attend_and_tell, self._where)
+        if self.plan.at_pause == "stop":
+            raise nobody_there(self.plan.job.name, line.number, "cut the sheet anew")
+        if self.plan.at_pause == "wait":
+            self.held, self._waits = True, waiting_at(self.plan.job.name, line.number)
+            self._rest_while_held()
+            self._waits = ""
+
+    @property
+    def state(self) -> str:
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`."""
+        return self._waits or super().state
 
     def _lines(self) -> Iterator[SendLine]:
         job = self.plan.job
@@ -152,6 +181,14 @@ class MarlinWire:
             self._transcript.came(self.now(), data)
         self._connection.receive_data(data)
         return list(self._connection.replies())
+
+    def listen(self, timeout: float, where: str) -> None:
+        """Hear for ``timeout`` seconds what the controller says while it has nothing to do.
+
+        Raises :class:`~miurafab.errors.ControllerError` for a halt or a restart.
+        """
+        for reply in self.receive(timeout):
+            self._look(reply, None, where)
 
     def _write(self, data: bytes) -> None:
         self._transport.write(data)

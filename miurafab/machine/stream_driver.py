@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
-from miurafab.errors import JobStopped, MachineError, MiurafabError
+from miurafab.errors import JobStopped, MachineError, MiurafabError, PersonNeeded
 from miurafab.findings import Finding
 from miurafab.grbl.streamer import Refusal
 from miurafab.machine.journal import Journal
@@ -231,6 +231,21 @@ class StreamDriver(ABC):
         """Stop the machine if it is still at risk: the last line of defence on every way out."""
         if self.at_risk:
             self.stop(None)
+
+
+def waiting_at(name: str, line: int) -> str:
+    """What is told while the program ``name`` waits at ``line`` for a person at the keys."""
+    return f"waiting at {name}, line {line} (M0): r goes on"
+
+
+def nobody_there(name: str, line: int, way: str) -> PersonNeeded:
+    """The error for the program ``name`` that waits at ``line`` for a person who is not there;
+    ``way`` is how to go on in a terminal.
+    """
+    return PersonNeeded(
+        f"{name}, line {line} waits for a person (M0), and nobody is at the keys; {way} in a "
+        "terminal, or leave the pauses out"
+    )
 
 
 def _were_in_force(overridden: set[Overrides]) -> Finding:

@@ -7,13 +7,21 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from miurafab.__main__ import main
-from miurafab.errors import ControllerError, InputError, JobStopped, PortError, ProfileError
+from miurafab.errors import (
+    ControllerError,
+    InputError,
+    JobStopped,
+    PersonNeeded,
+    PortError,
+    ProfileError,
+)
 from miurafab.gcode.job import Job
 from miurafab.machine.dialects import make_safe
 from miurafab.machine.faulty import FaultyDevice
@@ -124,6 +132,48 @@ def test_a_job_is_burnt_whole_and_ends_dark(tmp_path: Path) -> None:
     assert [p.lines_acknowledged for p in seen] == sorted(p.lines_acknowledged for p in seen)
     assert (run := read_journal(journal)[-1]).ended == "done"
     assert run.taken == result.lines
+    assert_dark(device)
+
+
+PAUSED = "M4 I S0\nG1 X9 S200 F3000\nM5 I\n{pause}\nM4 I S0\nG1 X12 S200\nM5 I\nM5\n"
+
+
+def paused(pause: str, at_pause: str) -> tuple[Wire, list[str]]:
+    """A job with a ``pause``, at which r is pressed after a while."""
+    device = new_device()
+    wire, told = Wire(device), list[str]()
+    plan = replace(plan_job(Job("p.nc", PAUSED.format(pause=pause)), MACHINE), at_pause=at_pause)
+    pressed = Pressed(device, r=20.0)
+    deliver(plan, wire, StopSignals(), keys=pressed, on_progress=lambda p: told.append(p.state))
+    assert_dark(device)
+    assert burnt(device) == [(0, 0, 9, 0), (9, 0, 12, 0)]
+    assert b"M0" not in wire.written
+    assert b"M1*" not in wire.written
+    return wire, told
+
+
+@pytest.mark.parametrize("pause", ["M0", "M00 (fresh paper)", "M1"])
+def test_the_host_pauses_in_place_of_a_controller_that_waits_for_its_button(pause: str) -> None:
+    _, told = paused(pause, "go on")
+    assert set(told) == {"Run"}
+    wire, told = paused(pause, "wait")
+    assert "waiting at p.nc, line 4 (M0): r goes on" in told
+    assert wire.now() > 20.0
+
+
+def test_a_pause_where_nobody_is_ends_the_job_dark_and_a_restart_in_it_is_noticed() -> None:
+    with pytest.raises(PersonNeeded, match=r"p\.nc, line 4 waits .*cut the sheet anew in a"):
+        paused("M0", "stop")
+    device = new_device()
+    plan = replace(plan_job(Job("p.nc", PAUSED.format(pause="M0")), MACHINE), at_pause="wait")
+    restarts = [device.power_cycle]
+
+    def before_read(now: float) -> None:
+        if now > 15.0 and restarts:
+            restarts.pop()()
+
+    with pytest.raises(ControllerError, match="restarted by itself after it took line 3"):
+        deliver(plan, Wire(device, before_read=before_read), StopSignals())
     assert_dark(device)
 
 

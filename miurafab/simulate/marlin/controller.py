@@ -290,6 +290,9 @@ class VirtualMarlin:
             yield self._at_rest
             seconds = float(words.get("P") or 0) / 1000 + float(words.get("S") or 0)
             yield from self._until(self.now + seconds)
+        elif said in ("M0", "M1") and self._emergency_parser:
+            yield self._at_rest
+            yield lambda: False  # until somebody presses its button
         elif said == "G28":
             yield self._at_rest
             self.homed += 1
