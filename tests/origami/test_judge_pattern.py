@@ -472,6 +472,14 @@ def test_a_facet_on_both_sides_of_an_edge_is_told() -> None:
         "window there: it is no polygon, and cannot be laid out on sheets. Join what is there to "
         "another side of the facet by a flat edge (F), or leave the edge out."
     )
+    both = CreasePattern(
+        np.concatenate([outer, inner, [[2.5, 2.5]]]),
+        np.concatenate([ring, [[2, 7]]]),
+        np.array([*"BBBBBBBFF"]),
+        np.zeros(9),
+        np.array([[0, 1, 2, 7, 2, 3, 0, 4, 6, 5, 4]]),
+    )
+    assert said(both)[0].endswith(" The same kind of fault is at 1 more edge (8).")
 
 
 def measured(**values: object) -> Measurements:
