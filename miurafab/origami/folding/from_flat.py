@@ -118,7 +118,7 @@ def fold_from_flat(
         if frame.unstable > stuck:
             if walk.leave_saddle():
                 frame = walk.frame()
-            else:  # nor will it leave those that follow
+            else:  # few that follow can be left
                 stuck = frame.unstable
         stuck = min(stuck, frame.unstable)
         frames.append(frame)

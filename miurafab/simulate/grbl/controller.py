@@ -324,18 +324,16 @@ class VirtualGrbl:
             if now > target:
                 break
             machine.now = now
-            if change == now:
+            wakes = change == now
+            if wakes:
                 processor.note(now)
                 stepper.run_to(now)
-                wakes = True
             elif arrival == now:
                 uart.arrive()
                 # A program that waits with bytes in the ring waits for something else.
                 wakes = len(uart.ring) == 1 or machine.pending()
                 if not wakes and uart.ring:
                     uart.fill(end)
-            else:
-                wakes = False
             if due == now or (wakes and self._wait is None):
                 self._resume()
         machine.now = max(machine.now, target)
