@@ -28,7 +28,8 @@ _M3 = re.compile(r"M\+?0*3(?:\.\d*)?(?![\d.])")
 _M4 = re.compile(r"M\+?0*4(?:\.\d*)?(?![\d.])")
 _SPINDLE = re.compile(r"M\+?0*(30?|2|4|5)(?:\.\d*)?(?![\d.])")
 _POWER = re.compile(rf"S({DECIMAL})")
-_DWELL = re.compile(r"G0*4(?![\d.])|M0*[01](?![\d.])")
+_PAUSE = re.compile(r"(?:N\d+)?M\+?0*[01](?:\.0*)?(?![\d.])")
+_DWELL = re.compile(rf"G\+?0*4(?:\.0*)?(?![\d.])|{_PAUSE.pattern}")
 _MIST_ANYWHERE = re.compile(rf"[mM]{_GAP}7")
 _MIST = re.compile(r"M\+?0*7(?:\.0*)?(?![\d.])")
 _AIR_ANYWHERE = re.compile(rf"[mM]{_GAP}[23789]")
@@ -88,6 +89,11 @@ def air_after(line: bytes, air: bool) -> bool:
     """Whether the air is open after ``line``, a line as it is sent, if it was ``air`` before."""
     words = _AIR.findall(line.decode("ascii"))
     return words[-1] in ("7", "8") if words else air
+
+
+def waits_for_person(line: bytes) -> bool:
+    """Whether ``line``, a line as it is sent, is a pause (``M0``, ``M1``) to Marlin."""
+    return _PAUSE.match(_code(line.decode("ascii"))) is not None
 
 
 def characters(job: Job) -> Iterator[Finding]:

@@ -21,7 +21,6 @@ without display and ``EMERGENCY_PARSER`` does not know them (Marlin 2.1: ``M0_M1
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator
 
 from miurafab.errors import ControllerError, MiurafabError, PortError
@@ -29,7 +28,7 @@ from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.machine.greeting import ANSWER_S
 from miurafab.machine.judge_job import longest_line
-from miurafab.machine.judge_words import air_after, leaves_air_on
+from miurafab.machine.judge_words import air_after, leaves_air_on, waits_for_person
 from miurafab.machine.session import HOMING_S
 from miurafab.machine.stream_driver import JobContext, StreamDriver, nobody_there, waiting_at
 from miurafab.machine.transcript import Transcript
@@ -45,7 +44,6 @@ NOT_CONFIRMED = (
 SET = (b"G21", b"G90")
 """mm and absolute moves, as after power-up: a board that was not reset keeps its last modes."""
 AIR_IS_ON = ", and the air stays on: shut it at the machine"
-_PAUSE = re.compile(rb"M0*[01](?![\d.])")
 _LOOK_S = 0.05  # between two reads of the keys
 _SILENCES = 3  # the line is sent again after each silence but the last
 _KILL_S = 0.8  # from M112 to its answer
@@ -83,7 +81,7 @@ class MarlinDriver(StreamDriver):
         wire = self._wire
         for line in self._lines():
             self._rest_while_held()
-            if _PAUSE.match(line.data):
+            if waits_for_person(line.data):
                 self._pause(line)
             else:
                 self._air = air_after(line.data, self._air)
