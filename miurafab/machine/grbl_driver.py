@@ -224,7 +224,7 @@ class GrblDriver(StreamDriver):
         if self._lit_holds > (0 if self._burns_in_hold else _LIT_HOLDS):
             raise ControllerError(
                 f"{self.plan.job.name} was held {self._streamer.where}, and the controller leaves "
-                "the beam on in a hold"
+                f"the beam on in a hold; {self._dark_way}"
             )
         if report.state not in _STOPPED or pauses or self.held:
             self._stopped_at = None
@@ -296,7 +296,7 @@ class GrblDriver(StreamDriver):
                 if order == HOLD and self._burns_in_hold:
                     raise JobAborted(
                         f"{self.plan.job.name} was stopped at the keyboard, not held: the "
-                        "controller leaves the beam on in a hold.",
+                        f"controller leaves the beam on in a hold; {self._dark_way}.",
                         at_once=True,
                     )
                 session.write(session.connection.send_realtime(order))
@@ -363,6 +363,13 @@ class GrblDriver(StreamDriver):
         off = machine.dialect == "grbl-0.9" or self._known.settings.values.get(32) == 0.0
         burns = program is None or bool(program.beam_on.any())
         return machine.tool.kind == "laser" and off and burns
+
+    @property
+    def _dark_way(self) -> str:
+        """What to do where the controller leaves the beam on in a hold, as a clause."""
+        if self.plan.machine.dialect != "grbl-0.9" and self._burns_in_hold:
+            return "with $32=1 (laser mode) it holds dark"
+        return "stop a job there by q or a reset, never by a hold"
 
     @property
     def _burns_at_rest(self) -> bool:

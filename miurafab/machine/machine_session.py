@@ -63,7 +63,7 @@ class MachineSession:
         most = setup.most_in_flight(transport.name)
         self.conversation = Session(transport, Connection(most), check=self._check)
         self.known = KnownController(self.conversation, setup.dialect)
-        self._resting_beam = RestingBeam(self.known)
+        self._resting_beam = RestingBeam(self.known, self.open)
         self._keys = keys or NoKeys()
         if not isinstance(self._keys, NoKeys):
             self.conversation.patience = _KEY_S
@@ -90,6 +90,7 @@ class MachineSession:
         :class:`~miurafab.errors.InputError` for a machine that only takes jobs.
         """
         require_talk(self._setup.dialect)
+        self._resting_beam.forget()
         greets = not self.known.opened
         self.known.open(self._setup.wait if wait is None else wait, reset=reset)
         if greets:
@@ -255,9 +256,8 @@ class MachineSession:
 
     def go_to_origin(self) -> MachineState:
         """Move the head to the origin of jobs, beam off, and wait."""
-        return self.jog(
-            x=0.0, y=0.0, feed_mm_min=self.known.rapid_mm_min or _GO_MM_MIN, absolute=True
-        )
+        feed = self.known.rapid_mm_min or _GO_MM_MIN
+        return self.jog(x=0.0, y=0.0, feed_mm_min=feed, absolute=True)
 
     def command(self, text: str) -> MachineState:
         """Send a person's line and wait for its answer; see :meth:`Session.command`."""
@@ -286,7 +286,6 @@ class MachineSession:
         elif text:
             bare = next(Job("The console", text).send_lines(), None)
             if bare is not None:
-                self.open()
                 self.command(self._resting_beam.sure_of(bare.data.decode("ascii")))
 
     def settle(self) -> MachineState:
@@ -298,6 +297,7 @@ class MachineSession:
     def load(self) -> MachineState:
         """Somebody has changed the material or turned it over; a lid opened for that is shut."""
         self.known.loaded = None
+        self._resting_beam.forget()
         if self.state.state != "Door:0":
             return self.state
         self.realtime(RESUME)  # nothing runs: the controller leaves the state Door
@@ -308,6 +308,7 @@ class MachineSession:
         whether the controller then reports that the beam is off. Keys do not end it half done.
         """
         self._pad.forget()
+        self._resting_beam.forget()
         session, self._at_risk, self._stops = self.conversation, True, True
         jogs = self.state.state == "Jog" and not self.state.beam_on and not at_once
         try:
@@ -337,11 +338,10 @@ class MachineSession:
             raise
 
     def _rests(self) -> bool:
-        session = self.conversation
-        if session.connection.in_flight:
+        if self.conversation.connection.in_flight:
             return False
         with suppress(ControllerError):  # one that is silent may move on
-            self._note(session.wait_status())
+            self._note(self.conversation.wait_status())
         return not self._at_risk
 
     # Jobs

@@ -84,11 +84,11 @@ class _Lit:
 
 class RestingBeam:
     """Knows which line was held back last, for the controller that is ``known``, and which were
-    sent since that told its modes; mutable.
+    sent since that told its modes; mutable. ``ask`` has it tell what is unknown.
     """
 
-    def __init__(self, known: KnownController) -> None:
-        self._known = known
+    def __init__(self, known: KnownController, ask: Callable[[], object]) -> None:
+        self._known, self._ask = known, ask
         self._held = ""
         self._since: list[str] = []
 
@@ -101,6 +101,7 @@ class RestingBeam:
         would put the resting beam on, or its power up, unless it is the same as the last.
         """
         held, self._held = self._held, ""
+        self._ask()
         read = plain_code("", 0, line)
         if line != held:
             self._refuse(line, read)

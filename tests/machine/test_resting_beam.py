@@ -381,6 +381,26 @@ def test_a_line_that_was_held_back_before_a_job_is_held_back_after_it() -> None:
     assert not wire.device.beam_on
 
 
+@pytest.mark.parametrize("action", ["jog", "nudge", "unlock", "set_origin", "load", "abort"])
+def test_a_line_that_was_held_back_before_another_action_is_held_back_after_it(action: str) -> None:
+    session, wire = here(laser_mode=False)
+    ways = {"jog": {"x": 5.0}, "nudge": {"dx": 1.0, "dy": 0.0}}
+    assert not is_sent(session, wire, "M3S500")
+    getattr(session, action)(**ways.get(action, {}))
+    session.watch(1.0)
+    assert not is_sent(session, wire, "M3S500")
+    assert not wire.device.beam_on
+
+
+def test_a_look_between_two_equal_lines_is_no_action() -> None:
+    session, wire = here(laser_mode=False)
+    assert not is_sent(session, wire, "M3S500")
+    session.say("?")
+    session.look()
+    assert is_sent(session, wire, "M3S500")
+    assert session.close()
+
+
 @pytest.mark.parametrize("text", ["M4 S0\nG0 X9\nM5\n", "G0 X500\n"])
 def test_a_beam_that_rests_before_a_job_goes_out_with_the_refusal(text: str) -> None:
     session, wire = here(laser_mode=False)
