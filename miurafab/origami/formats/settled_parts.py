@@ -55,7 +55,7 @@ class SettledParts:
 
     def are_merged(self, wider: DrawnSides) -> bool:
         """Whether the same lines, drawn with a ``wider`` tolerance, lose one of their own, or a
-        vertex of a settled part meets another vertex or line of one.
+        vertex of a settled part meets another vertex of one, or a line that it did not meet before.
         """
         first, now = self.drawn.ends, wider.ends
         if ((first[:, 0] != first[:, 1]) & (now[:, 0] == now[:, 1])).any():
@@ -73,11 +73,23 @@ class SettledParts:
         found = place < len(met)
         found[found] = met[place[found], 0] == side[found]
         line, other = line[found], met[place[found], 1]
+        # an end on a curve lies off the straight lines that stand for it, as it is drawn
+        new = ~np.isin(self._meetings(line, other), self._meetings(*self._drawn))
+        line, other = line[new], other[new]
         start, end = (self.drawn.points[first[line, at]] for at in (0, 1))
         along = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
         offset = self.drawn.points[other] - start
         off = offset - np.einsum("nk,nk->n", offset, along)[:, None] * along
         return self._far(first[line, 0], other, off)
+
+    @property
+    def _drawn(self) -> tuple[Ints, Ints]:
+        """Each line as it is drawn, with a vertex at which it is cut."""
+        return np.repeat(self.drawn.line, 2), self.drawn.sides.ravel()
+
+    def _meetings(self, line: Ints, vertex: Ints) -> Ints:
+        """(n,) a number for each pair of a ``line`` and a ``vertex`` on it."""
+        return line * len(self.drawn.points) + vertex
 
     def _far(self, one: Ints, other: Ints, between: Floats) -> bool:
         """Whether one of the vectors ``between`` (n, 2) two vertices is longer than rounding."""

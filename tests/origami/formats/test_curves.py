@@ -388,3 +388,15 @@ def test_what_a_crease_lost_is_what_the_finished_pattern_lacks_of_it(curve, vall
     (lost,) = [each.sentence for each in pattern.told if each.code == "lost-lines"]
     assert "1 line of the drawing is left out in part" in lost
     assert f"by up to {missing:.3g} mm" in lost
+
+
+def test_an_end_on_a_curve_is_no_end_that_a_tolerance_moved() -> None:
+    """It lies off the straight lines of the curve; nothing was read then (AssertionError)."""
+    high = 80 - math.sqrt(1600 - 8**2)
+    drawing = (
+        '<svg><path stroke="#000" d="M0 0H100V80H0Z"/><path stroke="#00f" d="M4 0.5V79.5"/>'
+        '<path stroke="#f00" d="M10 0A40 40 0 0 0 90 0"/>'
+        f'<path stroke="#00f" d="M58 80v{-high}"/></svg>'
+    )
+    found = pattern_from_lines(parse_svg(drawing, 1.0))
+    assert {finding.code for finding in found.told} == {"curved-lines", "joined-ends"}
