@@ -147,6 +147,7 @@ def _pulled(answer: dict[str, Any]) -> dict[str, Any]:
         **({} if left is None else {"Stays longer by": f"{round(left, 6) + 0.0:.3g} mm"}),
         "Creases that yield": f"{100 * answer['yielded']:.3g} %",
         "Facets that cross": counted(through, "pair", "pairs") if through else "none",
+        **({"Contact": "springs keep facets apart"} if answer["contact"] else {}),
         "Material": f"{answer['thickness_mm']:.3g} mm thick, modulus "
         f"{answer['modulus_pa'] / 1e9:.3g} GPa, crease length {answer['crease_length_mm']:.3g} mm",
     }

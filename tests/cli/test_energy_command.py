@@ -123,6 +123,8 @@ def test_a_pull_is_told_in_newtons(run, saved, hypar, tmp_path):
     assert {row["way"] for row in rows} == {"out", "back"}
     crossing = [_pulled(answer | {"piercings": n})["Facets that cross"] for n in range(3)]
     assert crossing == ["none", "1 pair", "2 pairs"]
+    assert "Contact" not in _pulled(answer)
+    assert _pulled(answer | {"contact": True})["Contact"] == "springs keep facets apart"
     done = run("energy", saved, *asked, "-o", tmp_path / "pull.svg")
     assert " N pull it to a strain of 0.1" in done.stdout
     assert (tmp_path / "pull.svg").read_bytes().startswith(b"<?xml")

@@ -209,6 +209,7 @@ def sheet_model(
         ),
         unit_mm=unit,
         unit_joule=unit_joule,
+        triangles=triangles,
     )
 
 

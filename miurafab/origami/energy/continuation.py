@@ -122,22 +122,38 @@ def extrapolate(known: Sequence[Known], drive: float) -> EquilibriumState:
     return guess
 
 
-def without_load(driven: Driven, known: Sequence[Known], before: int) -> Known:
-    """The state without load between two neighbours in ``known``, by regula falsi (Illinois)."""
-    left, right = known[before], known[before + 1]
+def between(driven: Balance, known: Sequence[Known]) -> Callable[[float], Solution]:
+    """What finds the equilibrium at a drive between ``known`` states."""
+    factored: Factored | None = None
+
+    def towards(drive: float) -> Solution:
+        nonlocal factored
+        solution = solve(driven, extrapolate(known, drive), drive, factored)
+        factored = solution.factored
+        return solution
+
+    return towards
+
+
+def without_load(
+    driven: Driven, left: Known, right: Known, towards: Callable[[float], Solution]
+) -> Known:
+    """The state without load between ``left`` and ``right``, by regula falsi (Illinois).
+
+    ``towards`` finds the state at a drive between theirs.
+    """
     a, b = ((known.drive, driven.load(known.state, known.drive)) for known in (left, right))
     scale = max(abs(a[1]), abs(b[1]))
     best = left if abs(a[1]) < abs(b[1]) else right
     load = min(a[1], b[1], key=abs)
-    factored: Factored | None = None
     for _ in range(MAX_FALSI):
         if abs(load) <= ZERO_LOAD * scale:
             break
         drive = (a[0] * b[1] - b[0] * a[1]) / (b[1] - a[1])
-        solution = solve(driven, extrapolate(known, drive), drive, factored)
+        solution = towards(drive)
         if not solution.converged:
             break
-        factored, load = solution.factored, driven.load(solution.state, drive)
+        load = driven.load(solution.state, drive)
         best = Known(drive, solution.state)
         a = (a[0], a[1] / 2) if (load < 0) == (b[1] < 0) else b
         b = (drive, load)

@@ -20,7 +20,7 @@ import numpy as np
 
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import BarHingeModel, sheet_model
-from miurafab.origami.energy.continuation import LONGEST, Known, without_load
+from miurafab.origami.energy.continuation import LONGEST, Known, between, without_load
 from miurafab.origami.energy.equilibrium import solve
 from miurafab.origami.energy.path import (
     NEARLY_FLAT,
@@ -210,7 +210,8 @@ def _stationary(traced: Traced, path: Path) -> tuple[list[StableState], list[Sta
         ]
         rising = path.loads[k] * (traced.drives[k + 1] - traced.drives[k]) > 0
         states = maxima if rising else minima
-        found = without_load(traced.driven, known, int(k) - first)
+        left, right = known[int(k) - first : int(k) - first + 2]
+        found = without_load(traced.driven, left, right, between(traced.driven, known))
         states.append(StableState(found.drive, traced.driven.model.energy(found.state.points)))
     return maxima, minima
 

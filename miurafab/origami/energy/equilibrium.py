@@ -164,6 +164,10 @@ class Balance:
         """The springs between facets that touch at ``points``; none here."""
         return NO_TOUCH
 
+    def free_part(self, points: Floats, step: Floats) -> float:
+        """The part of a ``step`` (V, 3) from ``points`` (V, 3) that nothing blocks; all, here."""
+        return 1.0
+
     def residual(self, state: EquilibriumState, target: float) -> Residual:
         """F at ``state``, with what is driven at ``target``."""
         model, points = self.model, state.points
@@ -323,7 +327,8 @@ def solve(
     for _ in range(MAX_ITERATIONS):
         if size <= TOLERANCE:
             if factored is not None and size > ROUNDING:
-                nearer = state.plus(driven.step(factored, residual), 1.0)
+                step = driven.step(factored, residual)
+                nearer = state.plus(step, driven.free_part(state.points, step.points))
                 if driven.size(driven.residual(nearer, target)) < size:
                     state = nearer
             return Solution(state, factored, True)
@@ -338,13 +343,13 @@ def solve(
             except RuntimeError:  # exactly singular, or not definite
                 break
         step = driven.step(factored, residual)
-        length = 1.0
+        length = free = driven.free_part(state.points, step.points)
         while True:
             trial = state.plus(step, length)
             left = driven.residual(trial, target)
             rest = driven.size(left)
             better = rest < (1 - ENOUGH * length) * size
-            if better or not fresh or length <= SHORTEST_STEP:
+            if better or not fresh or length <= SHORTEST_STEP * free:
                 break
             length /= 2
         if better:

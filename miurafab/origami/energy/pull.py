@@ -3,7 +3,8 @@
 In each cycle their distance grows to (1 + strain) times that of the folded form, and then shrinks
 until no force is left. Every other vertex is free, as between the two hooks of a testing machine.
 The creases yield (:mod:`~miurafab.origami.energy.yielding`), so the sheet comes back a little
-longer, and from the second cycle on it takes another way than in the first.
+longer, and from the second cycle on it takes another way than in the first. Facets that would pass
+through each other are held apart (:mod:`~miurafab.origami.energy.held_apart`).
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ import numpy as np
 from miurafab.errors import InputError, PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy.bar_hinge import BarHingeModel, Paper, sheet_model
-from miurafab.origami.energy.continuation import Known, Progress, Walk, without_load
+from miurafab.origami.energy.bar_hinge import Paper, sheet_model
+from miurafab.origami.energy.continuation import Progress, Walk
+from miurafab.origami.energy.held_apart import TouchingDriven, TouchingWalk
+from miurafab.origami.energy.pull_cycles import PullCycles
 from miurafab.origami.energy.result import EnergyResult
 from miurafab.origami.energy.yielding import YieldingDriven
-from miurafab.origami.folding.contact import most_meeting
+from miurafab.origami.folding.contact import most_meeting, self_intersections
 from miurafab.origami.piece import Piece, pieces_of
 
 if TYPE_CHECKING:
@@ -64,7 +67,9 @@ class PullCurve(EnergyResult):
     converged : bool
         Whether all cycles were found; otherwise the curve ends where the sheet jumps away.
     piercings : int
-        The most pairs of facets that pass through each other in a state of the first way out.
+        The most pairs of facets that pass through each other in one state.
+    touching : bool
+        Whether springs hold facets apart.
     """
 
     ends: tuple[int, int]
@@ -81,6 +86,7 @@ class PullCurve(EnergyResult):
     slips: Floats
     converged: bool
     piercings: int = 0
+    touching: bool = False
 
     @property
     def extensions(self) -> Floats:
@@ -118,6 +124,7 @@ class PullCurve(EnergyResult):
             "second_cycle_change_n": changes[0] if changes else None,
             "third_cycle_change_n": changes[1] if len(changes) > 1 else None,
             "yielded": float((self.slips != 0).mean()),
+            "contact": self.touching,
             "piercings": self.piercings,
             "thickness_mm": paper.thickness_mm,
             "modulus_pa": paper.modulus_pa,
@@ -165,7 +172,8 @@ class PullCurve(EnergyResult):
             reached = self.extensions[-1] / self.distances[0]
             return (
                 f"The way was lost at a strain of {reached:.3g}, where the sheet jumps to another "
-                "shape or is stretched out; ask for a smaller `strain`, or take more `steps`."
+                f"shape{', jams' * self.touching} or is stretched out; ask for a smaller `strain`, "
+                "or take more `steps`."
             )
         answer = self.report()
         force, left = answer["force_n"], answer["set_mm"]
@@ -218,6 +226,9 @@ def pull(
     :class:`~miurafab.errors.PatternError` as
     :func:`~miurafab.origami.energy.bar_hinge.sheet_model` does and without ``ends`` for a pattern
     without a grid, and :class:`~miurafab.errors.InputError` for vertices that cannot be pulled.
+
+    ``paper`` has a crease length. Where facets pass through each other the sheet is pulled again
+    with springs that hold them apart; not if they meet in the folded form already.
     """
     if pattern.pieces_count > 1:
         piece, pair = _piece_of(pattern, ends)
@@ -239,17 +250,24 @@ def pull(
         return replace(curve, ends=pair, coords=coords)
     model = sheet_model(pattern, paper=paper, uncut=uncut)
     pair = _pair(pattern, ends)
-    bending = len(model.hinges) - (len(model.creases) if paper.crease_length_mm else 0)
     yields = np.full(len(model.hinges), math.inf)
-    yields[bending:] = paper.yield_angle
-    driven = YieldingDriven(
-        model, np.array(pair, dtype=np.int64), yields=yields, hardening=paper.hardening
+    yields[-len(model.creases) :] = paper.yield_angle
+    stencil = np.array(pair, dtype=np.int64)
+    driven = YieldingDriven(model, stencil, yields=yields, hardening=paper.hardening)
+    free = PullCycles(driven, Walk(driven, driven.rest), strain, steps, cycles, on_progress)
+    curve = _walked(pattern, paper, pair, free)
+    if not curve.piercings or len(self_intersections(pattern)):
+        return curve
+    apart = TouchingDriven(
+        model, stencil, yields=yields, hardening=paper.hardening, edges=pattern.edges_vertices
     )
-    pulled = _Pulled(driven, strain, steps, cycles, on_progress)
-    converged = pulled.run()
-    curve = _curve(pulled, pair, paper, converged, driven.slips[bending:])
-    way_out = curve.coords[curve.loading & (curve.cycles == 1)]
-    return replace(curve, piercings=most_meeting(pattern, way_out))
+    with_contact = None if on_progress is None else _with_contact(on_progress)
+    held = PullCycles(apart, TouchingWalk(apart, apart.rest), strain, steps, cycles, with_contact)
+    return replace(_walked(pattern, paper, pair, held), touching=True)
+
+
+def _with_contact(on_progress: Progress) -> Progress:
+    return lambda part, text: on_progress(part, f"with contact, {text}")
 
 
 def _piece_of(
@@ -301,79 +319,13 @@ def _pair(pattern: CreasePattern, ends: tuple[int, int] | None) -> tuple[int, in
     return ends
 
 
-class _Pulled:
-    """The cycles of one sheet as they are walked; ``rows`` hold what each state was."""
-
-    def __init__(
-        self,
-        driven: YieldingDriven,
-        strain: float,
-        steps: int,
-        cycles: int,
-        on_progress: Progress | None,
-    ) -> None:
-        self.driven, self.strain, self.on_progress = driven, strain, on_progress
-        self.first = driven.value(driven.model.points)
-        self.drives = self.first * (1 + strain * np.linspace(0, 1, steps + 1))
-        self.outward = math.copysign(1.0, strain)
-        self.count = cycles
-        self.walk = Walk(driven, driven.rest)
-        self.rows: list[tuple[float, ...]] = []
-        self.shapes: list[Floats] = []
-
-    def run(self) -> bool:
-        """Whether all cycles were walked to their end."""
-        return all(self._out(c) and self._back(c) for c in range(1, self.count + 1))
-
-    def _out(self, cycle: int) -> bool:
-        start = -math.inf if cycle == 1 else self.outward * self.walk.last.drive
-        if cycle > 1:
-            self.walk.turn()
-            self._note(cycle, True)
-        for drive in self.drives[self.outward * self.drives > start]:
-            if not self.walk.to(float(drive)):
-                return False
-            self._note(cycle, True)
-        return True
-
-    def _back(self, cycle: int) -> bool:
-        """Back until there is no force left."""
-        self.walk.turn()
-        step = abs(self.drives[-1] - self.drives[-2])
-        while self.outward * self._load() > 0:
-            drive = self.walk.last.drive - self.outward * step
-            met = self.walk.towards(drive)
-            if not met.converged:
-                if not self.walk.to(drive):
-                    return False
-            elif self.outward * self.driven.load(met.state, drive) > 0:
-                self.walk.take(Known(drive, met.state))
-            else:
-                known = [*self.walk.known, Known(drive, met.state)]
-                self.walk.take(without_load(self.driven, known, len(known) - 2))
-                self._note(cycle, False)
-                break
-            self._note(cycle, False)
-        return True
-
-    def _load(self) -> float:
-        return self.driven.load(self.walk.last.state, self.walk.last.drive)
-
-    def _note(self, cycle: int, loading: bool) -> None:
-        drive, state = self.walk.last
-        lost = sum(self.driven.spent)
-        load, stored = self._load(), self.driven.stored(state)
-        self.rows.append((cycle, loading, drive, load, stored, lost))
-        self.shapes.append(state.points)
-        if self.on_progress is not None:
-            share = (cycle - 1 + 0.5 * (not loading)) / self.count
-            self.on_progress(share, f"cycle {cycle} of {self.count}")
-
-
-def _curve(
-    pulled: _Pulled, ends: tuple[int, int], paper: Paper, converged: bool, slips: Floats
+def _walked(
+    pattern: CreasePattern, paper: Paper, ends: tuple[int, int], pulled: PullCycles
 ) -> PullCurve:
-    model: BarHingeModel = pulled.driven.model
+    """The curve of ``pulled``, whose cycles are walked here."""
+    converged = pulled.run()
+    driven = pulled.driven
+    model = driven.model
     if not pulled.rows:
         raise PatternError(
             "The folded form is not in equilibrium: its facets are not flat, or it has a crease of "
@@ -383,6 +335,7 @@ def _curve(
     cycle, loading, drive, load, stored, lost = np.array(pulled.rows, dtype=float).T
     work = np.concatenate([[0.0], np.cumsum(np.diff(drive) * (load[1:] + load[:-1]) / 2)])
     joule = model.unit_joule
+    coords = np.stack(pulled.shapes) @ driven.axes.T * model.unit_mm
     return PullCurve(
         ends=ends,
         strain=pulled.strain,
@@ -394,7 +347,8 @@ def _curve(
         works=work * joule,
         stored=stored * joule,
         dissipated=lost * joule,
-        coords=np.stack(pulled.shapes) @ pulled.driven.axes.T * model.unit_mm,
-        slips=slips,
+        coords=coords,
+        slips=driven.slips[-len(model.creases) :],
         converged=converged,
+        piercings=most_meeting(pattern, coords),
     )

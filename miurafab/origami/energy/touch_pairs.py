@@ -10,11 +10,13 @@ of the other. Things that are near each other in the flat sheet already have a s
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, places_among
 from miurafab.geometry.nearest import tree_of
-from miurafab.origami.energy.touching import HEIGHT, TouchPairs, gaps
+from miurafab.origami.energy.touching import HEIGHT, NO_PAIRS, TouchPairs, gaps
 
 REACH = 0.35
 """Mean edges within which two things are a pair."""
@@ -22,6 +24,10 @@ CROSSING, PARALLEL = 0.15, 0.1
 """The sine of the angle of two edges from which g is 1, and g of parallel ones."""
 LOWER = 0.5
 """h is at most this part of the distance in the flat sheet."""
+ARMED = 0.1
+"""Mean edges within which a pair has its spring from the beginning of a step."""
+LEASH = REACH - HEIGHT
+"""Mean edges by which two things may come nearer before it is looked anew which are near."""
 
 
 class NearPairs:
@@ -122,6 +128,64 @@ class NearPairs:
         """(n,) a number for each set of four vertices (n, 4)."""
         a, b, c, d = np.sort(corners, axis=1).T
         return np.asarray(((a * self._count + b) * self._count + c) * self._count + d)
+
+
+class LastingPairs(NearPairs):
+    """Pairs that keep the g at which they were found first, so that the energy of their springs is
+    one of the shape alone, on a long way too.
+    """
+
+    def __init__(self, triangles: Ints, edges: Ints, hinges: Ints, rest: Floats) -> None:
+        self._known, self._weights = np.empty(0, dtype=np.int64), np.empty(0)
+        super().__init__(triangles, edges, hinges, rest)
+
+    def at(self, points: Floats) -> TouchPairs:
+        """The pairs at ``points`` (V, 3) that are within ``REACH``."""
+        keys, pairs = self._within(points, REACH)
+        at, weight = places_among(self._known, keys), pairs.weight.copy()
+        weight[at >= 0] = self._weights[at[at >= 0]]
+        known = np.concatenate([self._known, keys[at < 0]])
+        order = np.argsort(known)
+        self._known = known[order]
+        self._weights = np.concatenate([self._weights, weight[at < 0]])[order]
+        return replace(pairs, weight=weight)
+
+
+class Contacts:
+    """The pairs that are ``near`` each other, of which some have springs; with None there are none.
+
+    Attributes
+    ----------
+    pairs : TouchPairs
+        All that are within ``REACH`` where it was last looked.
+    sprung : TouchPairs
+        Those of them with springs.
+    """
+
+    def __init__(self, near: NearPairs | None) -> None:
+        self._near = near
+        self.pairs = self.sprung = NO_PAIRS
+        self._armed = np.empty(0, dtype=bool)
+
+    def look(self, points: Floats, within: float) -> None:
+        """Look which pairs are near each other at ``points`` (V, 3), and give springs to those that
+        are nearer than ``within``.
+        """
+        if self._near is None:
+            return
+        self.pairs = self._near.at(points)
+        self._armed = np.zeros(len(self.pairs.edges), dtype=bool)
+        self.arm(points, within)
+
+    def arm(self, points: Floats, within: float) -> None:
+        """Give springs to the pairs that are nearer than ``within`` at ``points`` as well."""
+        self._armed = self._armed.copy()
+        self._armed[self.pairs.nearer_than(within, points)[0]] = True
+        self.sprung = self.pairs.those(self._armed)
+
+    def lacking(self, points: Floats) -> bool:
+        """Whether a pair without a spring touches at ``points``."""
+        return not self._armed[self.pairs.touching(points)[0]].all()
 
 
 def _alike(size: Floats) -> list[Ints]:

@@ -225,10 +225,7 @@ def touch(
     pairs = pairs.those(live)
     normal = it.direction / it.distance[:, None]
     gradient = it.part[:, :, None] * normal[:, None]
-    d, h = it.distance, pairs.height
-    near, log = h - d, np.log(h / d)
-    push = -STIFFNESS * pairs.weight * near * (2 * log + near / d)
-    slope = STIFFNESS * pairs.weight * (2 * log + (4 + near / d) * near / d)
+    push, slope = spring_slopes(it.distance, pairs.height, STIFFNESS * pairs.weight)
     forces = push[:, None, None] * gradient
     if not stiff:
         return Touch(pairs.stencils, forces, np.empty((0, 4, 4, 3, 3)), soon)
@@ -243,9 +240,19 @@ def touch(
 def touch_energy(points: Floats, pairs: TouchPairs) -> float:
     """The energy of the springs of ``pairs`` at ``points`` (V, 3)."""
     live, it = pairs.touching(points)
-    h = pairs.height[live]
-    springs = pairs.weight[live] * (h - it.distance) ** 2 * np.log(h / it.distance)
+    springs = spring_energies(it.distance, pairs.height[live], pairs.weight[live])
     return STIFFNESS * float(springs.sum())
+
+
+def spring_energies(d: Floats, h: Floats, k: Floats) -> Floats:
+    """k (h - d)^2 log(h / d) of springs at the distances ``d`` (n,), and 0 beyond ``h`` (n,)."""
+    return np.asarray(k * np.maximum(h - d, 0.0) ** 2 * np.log(np.maximum(h / d, 1.0)))
+
+
+def spring_slopes(d: Floats, h: Floats, k: Floats) -> tuple[Floats, Floats]:
+    """The first and the second derivatives of :func:`spring_energies` by the distances."""
+    near, log = np.maximum(h - d, 0.0), np.log(np.maximum(h / d, 1.0))
+    return -k * near * (2 * log + near / d), k * (2 * log + (4 + near / d) * near / d)
 
 
 def _curvature(corners: Floats, it: Gap, normal: Floats) -> Floats:

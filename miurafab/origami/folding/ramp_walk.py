@@ -38,8 +38,8 @@ from miurafab.origami.energy.ramp import (
     raised_diagonal,
     softest_moves,
 )
-from miurafab.origami.energy.touch_pairs import REACH, NearPairs
-from miurafab.origami.energy.touching import HEIGHT, NO_PAIRS, free_way
+from miurafab.origami.energy.touch_pairs import ARMED, LEASH, REACH, Contacts, NearPairs
+from miurafab.origami.energy.touching import HEIGHT, free_way
 
 ENOUGH = 1e-6
 """The force, in k_f, at which a descent hands over to Newton's iteration."""
@@ -49,10 +49,6 @@ MOST_ARMINGS = 5
 """How often a step is solved anew with springs between what came to touch in it."""
 MOST_FACTORS = 4
 """How many factorisations Newton's iteration gets where facets may touch, before a descent."""
-ARMED = 0.1
-"""Mean edges within which a pair has its spring from the beginning of a step."""
-LEASH = REACH - HEIGHT
-"""Mean edges by which two things may come nearer before it is looked anew which are near."""
 MOST_PIECES, PIECE_ROUNDS = 80, 60
 """The most pieces of a descent with facets that touch, and the most steps of each."""
 FIRST, LONGER, SHORTEST = 1.0 / 8.0, 1.6, 1.0 / 64.0
@@ -123,8 +119,7 @@ class RampWalk:
         self._patience, self._pause = MAX_ITERATIONS, 0
         self.snaps = 0
         self._near = near
-        self._pairs = NO_PAIRS
-        self._armed = np.empty(0, dtype=bool)
+        self._contacts = Contacts(near)
         self._random = random
 
     def leave_flat(self, heights: Floats, part: float) -> bool:
@@ -288,7 +283,7 @@ class RampWalk:
         self._look(here, ARMED)
         moves = softest_moves(self._soft, here, part, moves)
         moves *= SOFTLY_SHAKEN / np.abs(moves).max()
-        return moves * free_way(here, moves, self._pairs)
+        return moves * free_way(here, moves, self._contacts.pairs)
 
     def _is_short(self, points: Floats) -> bool:
         """Whether the way to ``points`` is short enough for one step.
@@ -303,7 +298,7 @@ class RampWalk:
 
     def _is_free(self, before: Floats, after: Floats) -> bool:
         """Whether nothing passes through anything on the straight way."""
-        return free_way(before, after - before, self._pairs) == 1.0
+        return free_way(before, after - before, self._contacts.pairs) == 1.0
 
     def _accept(self, points: Floats) -> None:
         """Count angles on from ``points``, and look which facets are near each other there."""
@@ -312,19 +307,18 @@ class RampWalk:
 
     def _look(self, points: Floats, within: float) -> None:
         """Look which facets are near each other; those nearer than ``within`` get springs."""
-        if self._near is not None:
-            self._pairs = self._near.at(points)
-            self._armed = np.zeros(len(self._pairs.edges), dtype=bool)
-            self._arm(points, within)
+        self._contacts.look(points, within)
+        self._give_springs()
 
     def _arm(self, points: Floats, within: float) -> None:
         """Give springs to the pairs that are nearer than ``within`` at ``points`` as well."""
-        armed = self._armed.copy()
-        armed[self._pairs.nearer_than(within, points)[0]] = True
-        self._armed = armed
-        pairs = self._pairs.those(armed)
+        self._contacts.arm(points, within)
+        self._give_springs()
+
+    def _give_springs(self) -> None:
         self._soft, self._half, self._stiff = (
-            balance.with_pairs(pairs) for balance in (self._soft, self._half, self._stiff)
+            balance.with_pairs(self._contacts.sprung)
+            for balance in (self._soft, self._half, self._stiff)
         )
 
     def _solved(
@@ -339,12 +333,11 @@ class RampWalk:
         definite = self._near is not None
         factors = MOST_FACTORS if definite and balance is self._soft else factors
         for _ in range(MOST_ARMINGS):
-            balance = balance.with_pairs(self._pairs.those(self._armed))
+            balance = balance.with_pairs(self._contacts.sprung)
             found = solve(balance, guess, part, factored, definite=definite, factors=factors)
             if self._near is None or not found.converged:
                 return found
-            late = ~self._armed[self._pairs.touching(found.state.points)[0]]
-            if not late.any():
+            if not self._contacts.lacking(found.state.points):
                 return found
             self._arm(found.state.points, HEIGHT)
         return found._replace(converged=False)

@@ -14,7 +14,10 @@ from problems import regular
 
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
-from miurafab.origami.energy.bar_hinge import Paper
+from miurafab.origami.energy import pull as pulling
+from miurafab.origami.energy.bar_hinge import Paper, sheet_model
+from miurafab.origami.energy.held_apart import CLOSING, TouchingDriven
+from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.pull import pull
 from miurafab.origami.energy.pull_plot import draw_pull
 from miurafab.origami.energy.triangles import facet_triangles
@@ -156,20 +159,106 @@ def test_the_verdict_tells_pull_from_push():
     assert f"it stays {pulled.report()['set_mm']:.3g} mm longer" in pulled.verdict()
 
 
-def test_facets_that_pass_through_each_other_on_the_way_are_told():
-    """Pushed together at the middles of two sides, the hypar closes through itself."""
-    pushed = pull(hypar(), PAPER, (3, 45), strain=-0.5, steps=10, cycles=1)
-    split = facet_triangles(
-        np.pad(hypar().vertices_coords, ((0, 0), (0, 1))), hypar().faces_vertices
+@cache
+def closing(steps):
+    """Pushed together at the middles of two sides, the hypar would close through itself."""
+    return pull(hypar(), PAPER, (3, 45), strain=-0.5, steps=steps, cycles=1)
+
+
+def walked_through(monkeypatch):
+    """As it is pulled without contact."""
+    with monkeypatch.context() as patch:
+        patch.setattr(pulling, "self_intersections", lambda pattern: [0])
+        return pull(hypar(), PAPER, (3, 45), strain=-0.5, steps=10, cycles=1)
+
+
+def piercings(pattern, curve):
+    """The pairs of facets that meet, in the worst state."""
+    flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
+    split = facet_triangles(flat, pattern.faces_vertices)
+    return max(len(meeting_facets(pattern, points, split)) for points in curve.coords)
+
+
+def test_facets_are_held_apart_where_they_would_pass_through_each_other(monkeypatch):
+    through, apart = walked_through(monkeypatch), closing(10)
+    assert through.piercings == piercings(hypar(), through) > 0
+    assert not through.touching
+    assert apart.touching
+    assert apart.converged
+    assert apart.piercings == piercings(hypar(), apart) == 0
+    assert apart.report()["contact"]
+    assert apart.forces.min() < 1.02 * through.forces.min() < 0
+    assert apart.forces[:5] == pytest.approx(through.forces[:5], rel=1e-6)
+
+
+def test_work_is_what_is_stored_and_dissipated_with_contact_and_yielding():
+    """To second order in the steps."""
+    errors = []
+    for steps in (10, 20, 40):
+        curve = closing(steps)
+        assert curve.touching
+        assert curve.slips.any()
+        balance = curve.stored + curve.dissipated
+        errors.append(np.abs(curve.works - balance).max() / balance.max())
+    assert errors[-1] <= 2e-4
+    for coarse, fine in itertools.pairwise(errors):
+        assert coarse >= 3 * fine
+
+
+def test_an_elastic_cycle_gives_its_energy_back_with_contact():
+    elastic = replace(PAPER, yield_angle=math.inf)
+    curve = pull(hypar(), elastic, (6, 42), strain=-0.5, steps=12, cycles=2)
+    assert curve.touching
+    assert curve.converged
+    assert curve.piercings == 0
+    ends = [int(np.flatnonzero(curve.cycles == cycle)[-1]) for cycle in (1, 2)]
+    assert np.abs(curve.stored[ends]).max() <= 1e-12 * curve.stored.max()
+    assert curve.changes()[0] <= 1e-9 * np.abs(curve.forces).max()
+
+
+def test_the_forces_of_what_is_held_apart_are_the_slopes_of_what_is_stored():
+    """Facets, creases that are nearly closed, and what touches."""
+    curve = closing(20)
+    model = sheet_model(hypar(), paper=replace(PAPER, yield_angle=math.inf))
+    driven = TouchingDriven(
+        model,
+        np.array([3, 45]),
+        yields=np.full(len(model.hinges), math.inf),
+        hardening=0.1,
+        edges=hypar().edges_vertices,
     )
-    last = pushed.coords[np.flatnonzero(pushed.loading)[-1]]
-    assert pushed.piercings >= len(meeting_facets(hypar(), last, split)) > 0
-    assert pushed.report()["piercings"] == pushed.piercings
+    points = curve.coords[np.argmin(curve.extensions)] / model.unit_mm @ driven.axes
+    state = driven.rest._replace(points=points)
+    driven.arrive(state)
+    assert len(driven.contacts.sprung.touching(points)[0]) > 0
+    nearly_closed = np.abs(hinge_angles(points, model.hinges)) > np.pi - CLOSING
+    assert nearly_closed.any()
+    force = driven.residual(state, driven.value(points)).force
+    random = np.random.default_rng(3)
+    for _ in range(4):
+        move = random.normal(size=points.shape)
+        move.ravel()[np.setdiff1d(np.arange(points.size), driven.assembly.free)] = 0
+        step = 1e-6 * move
+        ends = [driven.stored(state._replace(points=points + sign * step)) for sign in (1, -1)]
+        along = float(force @ move.ravel()[driven.assembly.free])
+        assert (ends[0] - ends[1]) / 2e-6 == pytest.approx(along, rel=1e-5)
+
+
+def test_facets_that_pass_through_each_other_are_told(monkeypatch):
+    """Of a folded form in which facets meet already, nothing is held apart."""
+    pushed = walked_through(monkeypatch)
+    assert pushed.report()["piercings"] == pushed.piercings > 0
     through = " On the way facets pass through each other, as no paper does."
     assert pushed.verdict().endswith(through)
     pulled = pull(hypar(), PAPER, strain=0.1, steps=3, cycles=1)
     assert pulled.piercings == 0
+    assert not pulled.touching
     assert through not in pulled.verdict()
+
+
+def test_a_sheet_that_jams_is_lost_there():
+    jammed = replace(closing(10), converged=False)
+    assert "another shape, jams or is stretched out" in jammed.verdict()
 
 
 def test_layers_that_lie_on_each_other_pass_through_nothing():
