@@ -140,12 +140,9 @@ _POINTED = {28, 30, 38, 43, 61, 90, 91, 92}
 def look_up(letter: str, number: str, mist: bool) -> tuple[GcodeCommand | Reason, bool]:
     """The command of a word, or the reason why there is none; and whether it claims the axis words.
 
-    M7 exists only in firmware compiled with ``mist``. The fraction is read in hundredths in single
-    precision, as in ``gcode.c``.
+    M7 exists only in firmware compiled with ``mist``.
     """
-    value = read_single(number)
-    whole = whole_byte(value)
-    hundredths = _round_half_away(single(100.0 * single(value - whole))) & 0xFFFF
+    whole, hundredths = whole_and_hundredths(number)
     if letter == "M":
         if hundredths:
             return block_errors.NOT_WHOLE, False
@@ -159,6 +156,19 @@ def look_up(letter: str, number: str, mist: bool) -> tuple[GcodeCommand | Reason
     pointless = (whole, 0) in _G and whole not in _POINTED
     reason = block_errors.NOT_WHOLE if pointless else block_errors.UNSUPPORTED
     return reason, whole in _CLAIMING
+
+
+@lru_cache(maxsize=4096)
+def whole_and_hundredths(number: str) -> tuple[int, int]:
+    """The ``number`` of a G or M word: one byte, and the fraction in hundredths, in single
+    precision (``gcode.c``).
+
+    >>> whole_and_hundredths("+091.10")
+    (91, 10)
+    """
+    value = read_single(number)
+    whole = whole_byte(value)
+    return whole, _round_half_away(single(100.0 * single(value - whole))) & 0xFFFF
 
 
 def _round_half_away(value: float) -> int:

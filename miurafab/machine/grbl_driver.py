@@ -11,7 +11,6 @@ controller's queue behind up to seconds of burning.
 from __future__ import annotations
 
 import math
-import re
 from functools import cached_property
 from itertools import pairwise
 
@@ -24,7 +23,7 @@ from miurafab.grbl.events import Error, Event, Ok, StatusReport
 from miurafab.grbl.lines import dwell_seconds
 from miurafab.grbl.streamer import LineRefused, Streamer
 from miurafab.machine.greeting import ANSWER_S, RESTARTED
-from miurafab.machine.judge_words import leaves_air_on
+from miurafab.machine.judge_words import leaves_air_on, names_other_places
 from miurafab.machine.keys import HOLD, POWER, RESUME
 from miurafab.machine.preflight import (
     check_build,
@@ -43,9 +42,6 @@ NOT_CONFIRMED = (
 """The outcome of a stop, as a clause."""
 
 _WAS_ARMED = Finding("armed", "The job ended with the laser armed, so the controller was reset.")
-
-_OTHER_PLACES = re.compile(r"G\s*0*(?:10|28|30|38|43|5[3-9]|9[12])", re.IGNORECASE)
-"""Steps, the machine's own or stored places, and other origins than that of the job."""
 
 _DONE = ("Idle", "Check")
 """The states of a controller that does nothing, in a job that burns and in check mode."""
@@ -279,7 +275,7 @@ class GrblDriver(StreamDriver):
 
     @cached_property
     def _names_other_places(self) -> bool:
-        return _OTHER_PLACES.search(self.plan.job.text) is not None
+        return names_other_places(self.plan.job)
 
     def obey(self) -> None:
         """Send ``orders``, unless the controller is deaf while it writes its EEPROM; those that

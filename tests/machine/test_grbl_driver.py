@@ -242,6 +242,7 @@ def test_a_hold_before_a_pause_ends_no_job_that_stops_at_pauses() -> None:
         ("", "G1 X20 S500 F3000\n"),
         ("", "G20\nG1 X0.7874 S500 F100\nG21\n"),
         ("", "G91\nG1 X20 S500 F3000\nG90\n"),
+        ("G0X5\n", "G+91\nG1 X20 S500 F3000\nG90\n"),
         ("G0X5\n", "g91\nG1 X20 S500 F3000\nG90\n"),
         ("", "G92 X5\nG1 X25 S500 F3000\n"),
         ("", "G1 X20 S500 F3000\nG53 G0 X0\nG0 X20\n"),

@@ -14,6 +14,7 @@ from miurafab.machine.judge_words import (
     in_line,
     leaves_air_on,
     line_of_mist,
+    names_other_places,
     outputs,
     relative_moves,
 )
@@ -33,7 +34,20 @@ def test_a_line_is_named_with_how_many_more_there_are() -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["M3", "m3", "M03 S5", "M 3", "M+3", "M\t0(tool)03S5", "X1M3.0", "/M3", "S5 M3", "M3G1"]
+    "line",
+    [
+        "M3",
+        "m3",
+        "M03 S5",
+        "M 3",
+        "M+3",
+        "M\t0(tool)03S5",
+        "X1M3.0",
+        "/M3",
+        "S5 M3",
+        "M3G1",
+        "M 3.5",
+    ],
 )
 def test_m3_is_found_however_it_is_written(line: str) -> None:
     (found,) = constant_beam(job(f"G21\n(M3) M5\n{line}\nM3\n"), LASER)
@@ -42,7 +56,7 @@ def test_m3_is_found_however_it_is_written(line: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["M30", "M4", "M33", "M13", "(M3)", ";M3", "M3.0.1", "M3 !", "M(3)5", ""]
+    "line", ["M30", "M4", "M33", "M13", "M259", "M-3", "(M3)", ";M3", "M3.0.1", "M3 !", "M(3)5", ""]
 )
 def test_what_is_no_m3_is_none(line: str) -> None:
     assert list(constant_beam(job(f"{line}\n"), LASER)) == []
@@ -61,7 +75,25 @@ def test_a_line_ends_in_each_of_three_ways(end: str) -> None:
     assert found.where == "a.nc:1"
 
 
-@pytest.mark.parametrize("line", ["G91.1", "G910", "G90", "(G91)", "G1 X9 Y1"])
+@pytest.mark.parametrize("line", ["G+91", "G 9(b)1", "G91.0", "/g09/1 (c)", "G1G91"])
+def test_g91_is_found_as_the_firmware_reads_it(line: str) -> None:
+    (found,) = relative_moves(job(f"G90\n{line}\n"))
+    assert found.where == "a.nc:2"
+
+
+@pytest.mark.parametrize(
+    ("line", "named"),
+    [
+        *((f"{sign}{n}", True) for sign in ("G", "g+", "G 0") for n in (10, 28.1, 53, 59.2, 92)),
+        *(("G30", True), ("G38.2", True), ("G43.1", True), ("G9 1", True), ("G58", True)),
+        *(("G1X28", False), ("G90", False), ("G17G21", False), ("(G92)", False), ("G-10", False)),
+    ],
+)
+def test_words_that_name_other_places_than_those_of_the_job(line: str, named: bool) -> None:
+    assert names_other_places(job(f"G0X5\n{line}\n")) is named
+
+
+@pytest.mark.parametrize("line", ["G91.1", "G-91", "G347", "G910", "G90", "(G91)", "G1 X9 Y1"])
 def test_what_is_no_g91_is_none(line: str) -> None:
     assert list(relative_moves(job(line))) == []
 
@@ -174,6 +206,7 @@ def test_the_first_mist_is_found(text: str, line: int | None) -> None:
         ("S5\nG4 P1\nM3\n", []),
         ("S5\nG4 P1\n", []),
         ("M3\nG4 P1\n", []),
+        ("M3 S+5\nG 4.0 P1\nN7 M 0\nX1 M0\n", [(2, 5.0), (3, 5.0)]),
     ],
 )
 def test_a_dwell_after_m3_burns_by_the_words_alone(
