@@ -169,8 +169,8 @@ class KnownController:
         for question in wanted:
             if not session.connection.may_send(SendLine(0, question.encode("ascii"))):
                 return
-            self._unknown.discard(question)
             self._learn(question, session.ask(question))
+            self._unknown.discard(question)  # not where the answer was lost
         if session.work_offset is None:  # a board that was not reset tells it late
             session.work_offset = self._offset_in_force()
 
@@ -251,8 +251,9 @@ class KnownController:
         self.refresh(OFFSETS, MODES, STARTUP)
         if self._set:
             return ()
-        self._session.command(SET + self.modes.way_out)
-        self._set = True
+        told = MODES not in self._unknown  # not while it moves
+        self._session.command(SET + self.modes.way_out * told)
+        self._set = told
         self._unknown |= {MODES, OFFSETS} if TOOL_LENGTH in self.modes.modes else {MODES}
         findings = () if self._told else tuple(self.modes.findings())
         self._told = True

@@ -74,7 +74,11 @@ class ControllerModes:
 
     @property
     def way_out(self) -> str:
-        """What ends the modes that :data:`SET` does not end."""
+        """What ends the modes that :data:`SET` does not end: each that burns or blows, if it did
+        not say.
+        """
+        if not self.modes:
+            return "G0M5M9F0S0"
         return "".join(dict.fromkeys(filter(None, map(_back, self.modes))))
 
 

@@ -180,6 +180,20 @@ def test_a_controller_that_knows_no_such_question_is_still_set() -> None:
     assert device.position[:2] == pytest.approx((20, 10))
 
 
+def test_what_the_last_program_left_does_not_burn_where_the_modes_came_damaged() -> None:
+    class Noisy(FakeWire):
+        def read(self, timeout: float) -> bytes:
+            return super().read(timeout).replace(b"[GC:", b"[GD:")
+
+    device = controller()
+    device.advance(0.1)
+    device.receive(b"G1M4S700F500\n")
+    device.advance(1.0)
+    device.take_output()
+    deliver(plan_job(Job("job.nc", "G1 X10 F3000\nM5\n"), MACHINE), Noisy(device), StopSignals())
+    assert device.beam_log == []
+
+
 def late(seconds: float) -> FakeWire:
     """A board whose boot loader takes ``seconds`` after its port is opened, deaf meanwhile."""
 

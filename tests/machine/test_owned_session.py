@@ -12,12 +12,13 @@ from session_walk import FRAME, HOMING, JOB, MACHINE
 from wires import FakeWire
 
 from miurafab.errors import ControllerError, GcodeError, JobStopped, MachineError, PortError
-from miurafab.gcode.job import SendLine
+from miurafab.gcode.job import Job, SendLine
 from miurafab.grbl.settings import Settings
 from miurafab.machine.journal import read_journal
 from miurafab.machine.known_controller import MachineState, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, owner_of, this_owner
+from miurafab.machine.planning import plan_job
 from miurafab.machine.progress import Progress
 from miurafab.machine.resting_beam import resting_power
 from miurafab.machine.signals import StopSignals
@@ -164,6 +165,37 @@ def test_a_beam_of_which_nothing_is_known_is_disarmed_before_a_jog() -> None:
     session.known.may_differ()
     session.conversation.status = replace(status, state="Run")  # it tells no modes meanwhile
     assert sent_by(wire, session.known.disarm) == b"M5\n"
+
+
+def test_modes_of_which_the_answer_was_lost_are_not_known_before_a_jog() -> None:
+    session, wire = here()
+    session.open()
+    assert "M5" in session.state.modes
+    read = wire.read
+
+    def lossy(timeout: float) -> bytes:
+        data = read(timeout)
+        return b"" if wire.commands.endswith(b"M4S500\n$#\n$G\n") else data
+
+    wire.read = lossy  # type: ignore[method-assign]
+    with pytest.raises(ControllerError, match=r"did not answer '\$G' within 3 s"):
+        session.say("M4S500")
+    assert session.state.modes == ()
+    session.jog(x=2.0)
+    assert wire.device.beam_log == []
+
+
+def test_an_origin_set_in_mid_move_is_no_word_on_the_modes_of_a_job() -> None:
+    session, wire = here()
+    session.open()
+    session.say("G1M4S300X2F1000")
+    assert session.state.state == "Run"
+    session.set_origin()
+    session.watch(1.0)
+    wire.device.beam_log.clear()
+    job = Job("dark.nc", "G21\nG90\nM4\nG1X9F3000\nM5\n")  # burns nothing, by its dry run
+    session.cut(plan_job(job, MACHINE))
+    assert wire.device.beam_log == []
 
 
 def test_a_broken_account_at_rest_is_told_and_asks_nothing() -> None:
