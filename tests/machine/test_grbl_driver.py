@@ -666,11 +666,51 @@ def test_a_stop_that_nobody_ends_ends_the_job_after_ten_minutes(
     job = Job("held.nc", "M4 S0\nG1 X20 S500 F300\nM5\n")
     wire = new_wire()
     pressed_at_the_machine(wire, (2.0, order))
-    with pytest.raises(PersonNeeded, match=r"held\.nc was stopped at the machine \((Hold|Door)\)"):
+    says = r"held\.nc was stopped at the machine \((Hold|Door)\) for 10 minutes "
+    with pytest.raises(PersonNeeded, match=says):
         deliver(replace(plan_job(job, MACHINE), at_pause=at_pause), wire, StopSignals())
     assert 600 < wire.now() < 610
     assert b"\x18" in wire.commands
     assert not wire.device.beam_on
+
+
+class Told(FakeWire):
+    """Each hold is told with ``becomes`` in place of ``was``, ``count`` times."""
+
+    was, becomes, count = b"", b"", 0
+
+    def read(self, timeout: float) -> bytes:
+        said = super().read(timeout)
+        if self.count and b"<Hold:0" in said:
+            said, self.count = said.replace(self.was, self.becomes), self.count - 1
+        return said
+
+
+def told(was: bytes, becomes: bytes, count: int) -> Told:
+    wire = Told(new_wire().device)
+    wire.was, wire.becomes, wire.count = was, becomes, count
+    pressed_at_the_machine(wire, (2.0, b"!"), (22.0, b"~"))
+    return wire
+
+
+def test_a_change_of_the_tool_that_nobody_ends_ends_the_job(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("miurafab.machine.grbl_driver._HELD_S", 10.0)
+    job = Job("held.nc", "M4 S0\nG1 X20 S500 F300\nM5\n")
+    with pytest.raises(PersonNeeded, match=r"held\.nc was stopped at the machine \(Tool\) "):
+        deliver(plan_job(job, MACHINE), told(b"<Hold:0", b"<Tool", 999), StopSignals())
+
+
+def test_a_hold_that_stays_lit_in_laser_mode_ends_the_job() -> None:
+    """The beam goes out a moment after the hold is told, so two reports may tell it on."""
+    job = Job("held.nc", "M4 S0\nG1 X20 S500 F300\nM5\n")
+    assert deliver(plan_job(job, MACHINE), told(b">", b"|A:S>", 2), StopSignals()).lines == 3
+    says = "the controller leaves the beam on in a hold; stop a job there by q or a reset"
+    wire = told(b">", b"|A:S>", 3)
+    with pytest.raises(ControllerError, match=says):
+        deliver(plan_job(job, MACHINE), wire, StopSignals())
+    assert b"\x18" in wire.commands
 
 
 def test_who_is_at_the_keys_may_hold_as_long_as_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -450,6 +450,7 @@ def test_what_a_start_lights_behind_a_wait_is_known_when_the_line_is_done() -> N
     assert is_sent(session, wire, "$N0=G4P2")
     for line in ("$N1=M3S500", "$N1=M3S500", "M5", "$RST=#", "$RST=#"):
         is_sent(session, wire, line)
+    assert b"$RST=#\n$G\n" in wire.commands  # which is answered behind the blocks
     assert session.state.beam_on
     assert session.close()
     wire.device.advance(5.0)
