@@ -34,7 +34,7 @@ from miurafab.fabrication.stock import read_stock
 from miurafab.gcode.reading import read_program
 from miurafab.grbl import replies as grbl
 from miurafab.machine.actions import read_dump
-from miurafab.machine.journal import job_digest, read_journal
+from miurafab.machine.journal import read_journal
 from miurafab.machine.resume import resume
 from miurafab.marlin import replies as marlin
 from miurafab.options import read_options
@@ -119,7 +119,7 @@ def _about(path: Path) -> Iterator[None]:
 
 
 def _journal(path: Path) -> None:
-    runs = [replace(run, sha256=job_digest(JOB)) for run in read_journal(path)]
+    runs = [replace(run, sha256=JOB.sha256) for run in read_journal(path)]
     with _about(path):
         resume(JOB, MACHINES[".nc"], runs)
 

@@ -18,7 +18,7 @@ from miurafab.fabrication.toolpath import Toolpath
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import strokes
-from miurafab.machine.journal import JournalRun, job_digest
+from miurafab.machine.journal import JournalRun
 from miurafab.machine.planning import plan_job
 from miurafab.machine.resume import resume
 from miurafab.machine.sender import stream_plan
@@ -150,7 +150,7 @@ def test_a_chain_can_be_taken_up_in_its_middle(taken: int) -> None:
     with always_chained():
         job = post(perforation(200, 0.3, 0.2), LASER, CARD)
     whole = strokes(parse_program(job))
-    run = JournalRun(job.name, job_digest(job), LASER.name, "virtual", 400, taken=taken, line=taken)
+    run = JournalRun(job.name, job.sha256, LASER.name, "virtual", 400, taken=taken, line=taken)
     rest = resume(job, LASER, [run])
     made = strokes(parse_program(rest.job))
     assert len(made) == len(whole) - rest.stroke

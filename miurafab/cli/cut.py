@@ -157,9 +157,12 @@ def _stream(
     from miurafab.machine.keys import terminal_keys
     from miurafab.workflow.cut_sheets import cut_prepared
     from miurafab.workflow.dry_run import clock_text
+    from miurafab.workflow.material_change import wanted
+
+    burnt: int | None = None
 
     def before(number: int, count: int) -> None:
-        request = f"Sheet {number} of {count}: {_put_in(prepared, number)}, press Enter."
+        request = f"Sheet {number} of {count}: {wanted(prepared, number, burnt)}, press Enter."
         _wait(console, keys, request)
 
     def after_frame(number: int) -> None:
@@ -172,6 +175,8 @@ def _stream(
     with _hint_at_resume(console, prepared), console.progress("cutting") as bar:
 
         def show_progress(now: SheetProgress) -> None:
+            nonlocal burnt
+            burnt = now.number
             bar(
                 now.share,
                 f"sheet {now.number} of {len(prepared.jobs)}, stroke {now.stroke} of "
@@ -204,14 +209,14 @@ def _share(
 ) -> int:
     """Cut on several machines at once, and say which sheet went where."""
     from miurafab.machine.keys import NoKeys, terminal_keys
-    from miurafab.workflow.material_change import WAITS
+    from miurafab.workflow.material_change import WAITS, wanted
     from miurafab.workflow.multi_machine import share_sheets
 
     with console.progress("cutting") as bar, terminal_keys() as keys:
 
         def before(number: int, port: str, over: Callable[[], bool]) -> bool:
             console.note(
-                f"Sheet {number} of {len(prepared.jobs)} at {port}: {_put_in(prepared, number)} "
+                f"Sheet {number} of {len(prepared.jobs)} at {port}: {wanted(prepared, number)} "
                 "there, press Enter."
             )
             while not {"\n", "\r"} & set(keys.pressed()):
@@ -320,13 +325,6 @@ def _wait(console: Console, keys: Keys, request: str) -> None:
             time.sleep(_LOOK_S)
     elif not sys.stdin.readline():
         raise PersonNeeded("Nobody pressed Enter, and the input has ended; nothing more was cut.")
-
-
-def _put_in(prepared: Prepared, number: int) -> str:
-    """What to do before sheet ``number``, which is not the first."""
-    from miurafab.machine.planning import put_in
-
-    return put_in(prepared.jobs[number - 2].name, prepared.jobs[number - 1].name)
 
 
 def _refuse(console: Console, prepared: Prepared) -> int:

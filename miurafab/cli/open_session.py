@@ -231,7 +231,10 @@ def _answer(
         if state is not None:
             told = asdict(state)
             del told["settings"]
-            values["state"] = told | {"overrides": state.overrides._asdict()}
+            values["state"] = told | {
+                "overrides": state.overrides._asdict(),
+                "loaded": state.loaded and state.loaded.name,
+            }
         sys.stdout.write(json.dumps(values) + "\n")
         sys.stdout.flush()
     elif line is None:

@@ -9,9 +9,11 @@ an error that names the line. No line is skipped or changed in meaning.
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from miurafab.errors import GcodeError
 
@@ -39,6 +41,11 @@ class Job:
 
     name: str
     text: str
+
+    @cached_property
+    def sha256(self) -> str:
+        """The SHA-256 of the text, in hexadecimal."""
+        return hashlib.sha256(self.text.encode("utf-8")).hexdigest()
 
     @property
     def line_count(self) -> int:

@@ -17,7 +17,7 @@ from miurafab.errors import JobStopped, MiurafabError
 from miurafab.machine.dialects import driver_of
 from miurafab.machine.journal import Journal
 from miurafab.machine.keys import Keys
-from miurafab.machine.known_controller import KnownController
+from miurafab.machine.known_controller import Burnt, KnownController
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.session import Session
@@ -101,4 +101,4 @@ def send_job(
             raise
         finally:
             if burns and driver.acknowledged and not plan.options.check_mode:
-                wire.known.loaded = job.name
+                wire.known.loaded = Burnt(job.name, plan.sha256)

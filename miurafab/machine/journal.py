@@ -16,7 +16,6 @@ word (power loss). *Taken* is not *burnt*: the planner and the receive buffer st
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Sequence
@@ -56,7 +55,7 @@ class Journal:
         header: dict[str, Any] = {
             "schema": SCHEMA,
             "job": job.name,
-            "sha256": sha256 or job_digest(job),
+            "sha256": sha256 or job.sha256,
             "machine": machine,
             "port": port,
             "lines": lines,
@@ -169,11 +168,6 @@ def _run(record: dict[str, Any]) -> JournalRun:
     if not isinstance(run.seconds, int | float) or not math.isfinite(run.seconds):
         raise ValueError("it holds something else in place of a time")
     return run
-
-
-def job_digest(job: Job) -> str:
-    """The SHA-256 of the job's text, in hexadecimal."""
-    return hashlib.sha256(job.text.encode("utf-8")).hexdigest()
 
 
 def _record(values: dict[str, Any]) -> bytes:

@@ -39,14 +39,25 @@ _ONLY_JOBS = ("marlin", "hpgl")
 
 
 @dataclass(frozen=True)
+class Burnt:
+    """The job that has burnt on a sheet: its ``name`` and the ``sha256`` of its file."""
+
+    name: str
+    sha256: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
 class MachineState:
     """A controller at one moment; what it has not told is None or empty.
 
     ``state`` is the word of its status report with the substate, as ``Hold:0``. Positions are in
     mm: ``position`` in work coordinates, ``machine_position`` in the machine's own, ``work_offset``
     between them, ``shift`` the part of that which G92 set. ``beam_on`` and ``beam_off`` are both
-    False for a controller that does not report its beam (GRBL 0.9). ``loaded`` is the job that has
-    burnt on the sheet in the machine, None if the sheet is fresh.
+    False for a controller that does not report its beam (GRBL 0.9). ``loaded`` is what has burnt on
+    the sheet in the machine, None if the sheet is fresh.
     """
 
     port: str
@@ -61,7 +72,7 @@ class MachineState:
     beam_on: bool = False
     beam_off: bool = False
     pins: str = ""
-    loaded: str | None = None
+    loaded: Burnt | None = None
     settings: Settings = field(default=Settings({}), repr=False)
 
     @property
@@ -109,7 +120,7 @@ class KnownController:
         self.options: Options | None = None
         self.settings = Settings({})
         self.modes = ControllerModes((), {})
-        self.loaded: str | None = None
+        self.loaded: Burnt | None = None
         self.greeted = False
         self._session = session
         self._dialect = dialect

@@ -360,12 +360,12 @@ class MachineSession:
         :class:`~miurafab.errors.PersonNeeded` where a sheet lies in the machine on which another
         job has burnt.
         """
-        loaded, name = self.known.loaded, plan.job.name
+        loaded = self.known.loaded
         stays = plan.resumption is not None or not self._transport.blocks
-        if not (stays or loaded is None or feeds_itself(plan.machine, loaded, name)):
+        if not (stays or loaded is None or feeds_itself(plan.machine, plan.back)):
             raise PersonNeeded(
-                f"{loaded} has burnt on the sheet in the machine; {put_in(loaded, name)} and say "
-                f"so, then start {name}"
+                f"{loaded} has burnt on the sheet in the machine; "
+                f"{put_in(loaded.sha256, plan.back)} and say so, then start {plan.job.name}"
             )
         with self._job():
             return send_job(

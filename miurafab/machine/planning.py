@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal
 
 from miurafab.errors import GcodeError, InputError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import Program
-from miurafab.machine.journal import job_digest
 from miurafab.machine.judge_job import JudgedJob, judge_job
 from miurafab.machine.preflight import raise_findings, require_known
 from miurafab.machine.resume import Resumption
@@ -94,11 +92,12 @@ class JobPlan:
     """A job that passed the checks which need no controller.
 
     ``at`` is where the head stands (None: the controller knows), ``sha256`` that of the file whose
-    job this is. ``program`` is None where it could not be read and that was forced or is left to
-    check mode; ``forced`` are the refusals that were overridden. ``at_pause`` is what is done where
-    the program waits for a person (``M0``): a person at the keys goes on (``wait``), the job goes
-    on by itself (``go on``), or it ends, since nobody is there (``stop``). With ``homed`` the job
-    may lie anywhere within the machine's travel, from the origin that the controller tells.
+    job this is, and ``back`` that of the job for the back of its sheet, None for a sheet that is
+    worked from one side. ``program`` is None where it could not be read and that was forced or is
+    left to check mode; ``forced`` are the refusals that were overridden. ``at_pause`` is what is
+    done where the program waits for a person (``M0``): a person at the keys goes on (``wait``), the
+    job goes on by itself (``go on``), or it ends, since nobody is there (``stop``). With ``homed``
+    the job may lie anywhere within the machine's travel, from the origin that the controller tells.
     """
 
     job: Job
@@ -112,6 +111,7 @@ class JobPlan:
     sha256: str
     at_pause: AtPause = "stop"
     homed: bool = False
+    back: str | None = None
 
     @property
     def wait(self) -> float:
@@ -144,21 +144,20 @@ def head_at(at: Head | str, box: Box | None, name: str) -> Head:
     return x0 + right * (x1 - x0), y0 + back * (y1 - y0)
 
 
-def is_other_side(before: str, name: str) -> bool:
-    """Whether the file ``name`` is for the sheet whose back the file ``before`` was for."""
-    return Path(before).stem == f"{Path(name).stem}-back"
-
-
-def put_in(before: str, name: str) -> str:
-    """What somebody does between the files ``before`` and ``name``."""
-    if is_other_side(before, name):
+def put_in(burnt: str, back: str | None) -> str:
+    """What somebody does before a job for a sheet with the job ``back`` on its back (None: none),
+    where the job ``burnt`` has burnt on the sheet in the machine; both by their ``sha256``.
+    """
+    if back is None:
+        return "put in fresh material"
+    if back == burnt:
         return "turn the sheet over, left to right, and lay it by its three holes"
-    return "put in fresh material"
+    return "put in the sheet whose back is burnt, turned over left to right, by its three holes"
 
 
-def feeds_itself(machine: MachineProfile, before: str, name: str) -> bool:
-    """Whether ``machine`` changes the material between the files ``before`` and ``name`` itself."""
-    return machine.bed.roll_fed and not is_other_side(before, name)
+def feeds_itself(machine: MachineProfile, back: str | None) -> bool:
+    """Whether ``machine`` puts in the material of a job itself; see :func:`put_in`."""
+    return machine.bed.roll_fed and back is None
 
 
 def passed_checks(
@@ -235,6 +234,6 @@ def plan_job(
         resumption,
         forced,
         None if options.at is None else head_at(options.at, box, job.name),
-        sha256 or job_digest(job),
+        sha256 or job.sha256,
         homed=options.home and "bounds" in passed,
     )

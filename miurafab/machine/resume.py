@@ -39,7 +39,7 @@ from miurafab.gcode.program import RAPID, Program, Strokes, strokes
 from miurafab.gcode.reading import read_program
 from miurafab.gcode.words import FLOOD, GO_G28, GO_G30, MIST
 from miurafab.geometry.arrays import Ints
-from miurafab.machine.journal import JournalRun, job_digest
+from miurafab.machine.journal import JournalRun
 from miurafab.profiles import MachineProfile
 
 GRBL_BLOCKS, GRBL_SEGMENTS, OTHER_SEGMENTS = 15, 5, 12
@@ -113,7 +113,7 @@ def resume(job: Job, machine: MachineProfile, runs: Sequence[JournalRun]) -> Res
     if line == 1:
         stroke = 0
     new_stroke = int(np.searchsorted(first, possible, side="right"))
-    return Resumption(rest, job_digest(job), line, stroke, max(stroke, new_stroke), len(burnt))
+    return Resumption(rest, job.sha256, line, stroke, max(stroke, new_stroke), len(burnt))
 
 
 def from_stroke(job: Job, machine: MachineProfile, number: int) -> Resumption | None:
@@ -144,7 +144,7 @@ def from_stroke(job: Job, machine: MachineProfile, number: int) -> Resumption | 
             "lines at the top of the file",
         )
     stroke = number - 1
-    return Resumption(rest, job_digest(job), line, stroke, stroke, len(burnt), chosen=True)
+    return Resumption(rest, job.sha256, line, stroke, stroke, len(burnt), chosen=True)
 
 
 def _left_out(runs: Sequence[JournalRun], last: NDArray[np.int32]) -> int:
@@ -169,7 +169,7 @@ def _no_modes(machine: MachineProfile) -> str | None:
 
 
 def _require_resumable(job: Job, machine: MachineProfile, run: JournalRun) -> None:
-    if run.sha256 != job_digest(job):
+    if run.sha256 != job.sha256:
         raise InputError(
             f"The journal tells of another text of {run.job} than the one that is there now, so it "
             "cannot be resumed; cut it from the beginning on fresh material."

@@ -107,10 +107,10 @@ class Operator:
         """What a person has to do to the material before the next sheet is started, if anything."""
         if self.prepared is None or self.state is None or self.state.loaded is None:
             return ""
-        before, name = self.state.loaded, self.prepared.jobs[self.number - 1].name
-        if self.state.port == VIRTUAL or feeds_itself(self.prepared.machine, before, name):
+        back = self.prepared.back_of(self.number)
+        if self.state.port == VIRTUAL or feeds_itself(self.prepared.machine, back):
             return ""
-        return put_in(before, name)
+        return put_in(self.state.loaded.sha256, back)
 
     # What came
 

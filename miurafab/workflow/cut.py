@@ -69,6 +69,19 @@ class Prepared:
         """
         return (() if self.directory is None else self.directory.edits) + self.elsewhere
 
+    def sha256_of(self, number: int) -> str:
+        """The digest of the job of sheet ``number`` as it was written."""
+        job, aligned = self.jobs[number - 1], self.aligned
+        return (aligned.written if aligned and aligned.number == number else job).sha256
+
+    def back_of(self, number: int) -> str | None:
+        """The digest of the job for the back of sheet ``number``; None for a back itself and a
+        sheet that is worked from one side.
+        """
+        back = f"{Path(self.jobs[number - 1].name).stem}-back"
+        names = [Path(job.name).stem for job in self.jobs]
+        return self.sha256_of(names.index(back) + 1) if back in names else None
+
     def chosen(self, sheets: Sequence[int] | None) -> list[int]:
         """The numbers of the ``sheets`` (None: all); raises ``InputError`` for one that is
         missing.

@@ -18,7 +18,7 @@ from miurafab.files import AnyPath
 from miurafab.findings import Finding
 from miurafab.machine.job_process import session_apart
 from miurafab.machine.keys import Keys
-from miurafab.machine.planning import Head, JobPlan, feeds_itself, head_at, plan_job, put_in
+from miurafab.machine.planning import Head, JobPlan, feeds_itself, head_at, plan_job
 from miurafab.machine.progress import StreamResult
 from miurafab.machine.sender import SheetSession, session_here
 from miurafab.machine.trace_box import frame_job
@@ -37,7 +37,7 @@ from miurafab.profiles import MachineProfile
 from miurafab.workflow.alignment import align
 from miurafab.workflow.cut import Prepared, prepare
 from miurafab.workflow.cut_options import DEFAULT_OPTIONS, CutOptions
-from miurafab.workflow.material_change import at_pause, is_attended, needs_person
+from miurafab.workflow.material_change import at_pause, is_attended, needs_person, wanted
 from miurafab.workflow.sheet_plans import (
     beside,
     journal_path,
@@ -211,6 +211,7 @@ def cut_prepared(
     what :func:`~miurafab.machine.sender.stream_plan` raises.
     """
     done: list[CutSheet] = []
+    burnt = None
     prepared = align(prepared, sheets, options.align)
     plans = plan_sheets(prepared, sheets, options)
     at = plans[0][1].at
@@ -218,21 +219,21 @@ def cut_prepared(
     with _session(prepared, port, options, keys) as session:
         for number, plan in plans:
             further = bool(done) or (options.resume and plan.resumption is None)
-            before = done[-1].name if done else prepared.jobs[number - 2].name
             name = prepared.jobs[number - 1].name
-            fed = pause is None and feeds_itself(prepared.machine, before, name)
+            fed = pause is None and feeds_itself(prepared.machine, plan.back)
             if further and waits and not fed:
                 if before_sheet is not None:
                     with session.waits():
                         before_sheet(number, len(prepared.jobs))
                 elif done:
                     raise PersonNeeded(
-                        f"Before {name}, {put_in(before, name)}; nobody is here to do so. "
-                        f"Then go on with `sheet` {number}. Done: "
+                        f"Before {name}, {wanted(prepared, number, burnt)}; nobody is here to do "
+                        f"so. Then go on with `sheet` {number}. Done: "
                         f"{', '.join(sheet.name for sheet in done)}."
                     )
             if done:
                 session.load()
+            burnt = number
             placed_at = None if done else options.send.at
             notes = start_findings(prepared, number, plan.resumption, placed_at)
             if on_start is not None:

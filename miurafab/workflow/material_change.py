@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Sequence
 
 from miurafab.machine.keys import Keys, NoKeys
-from miurafab.machine.planning import AtPause, is_other_side
+from miurafab.machine.planning import AtPause, put_in
 from miurafab.machine.signals import StopSignals
 from miurafab.machine.transport import VIRTUAL
 from miurafab.workflow.cut import Prepared
@@ -29,8 +29,12 @@ def needs_person(prepared: Prepared, port: str, pause: bool | None) -> bool:
 
 def turns_over(prepared: Prepared) -> bool:
     """Whether a sheet is worked from both sides; no machine turns one over."""
-    names = [job.name for job in prepared.jobs]
-    return any(map(is_other_side, names, names[1:]))
+    return any(prepared.back_of(number) for number in range(1, len(prepared.jobs) + 1))
+
+
+def wanted(prepared: Prepared, number: int, burnt: int | None = None) -> str:
+    """What a person does before sheet ``number``, after sheet ``burnt`` or the one before it."""
+    return put_in(prepared.sha256_of(burnt or max(1, number - 1)), prepared.back_of(number))
 
 
 def is_attended(port: str, pause: bool | None) -> bool:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from miurafab.errors import GcodeError, InputError, OptionError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
-from miurafab.machine.journal import job_digest, read_journal
+from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import Head, JobPlan, head_at, passed_checks, plan_job
 from miurafab.machine.preflight import raise_findings, require_known
 from miurafab.machine.resume import Resumption, from_stroke, resume
@@ -72,9 +72,10 @@ def plan_sheets(
             most_power=prepared.most_power,
             judged=expected.judged,
             box=expected.bounds_mm,
-            sha256=job_digest(written),
+            sha256=prepared.sha256_of(number),
         )
-        plans.append((number, replace(plan, forced=edits + plan.forced)))
+        back = prepared.back_of(number)
+        plans.append((number, replace(plan, forced=edits + plan.forced, back=back)))
     if options.resume and not (begun and plans):
         raise InputError(
             f"No sheet of {prepared.name} was interrupted, by the journals beside it; leave "

@@ -13,7 +13,7 @@ import miurafab
 from miurafab.errors import InputError, OptionError
 from miurafab.gcode.program import strokes
 from miurafab.gcode.rigid_motion import RigidMotion
-from miurafab.machine.journal import job_digest, read_journal
+from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import SendOptions
 from miurafab.machine.sender import deliver
 from miurafab.machine.signals import StopSignals
@@ -117,7 +117,7 @@ def test_a_sheet_that_was_moved_while_interrupted_goes_on(prepared, tmp_path):
     options = CutOptions(send=SendOptions(at=(0.0, 0.0)), resume=True, align=marks_of(motion))
     (done,) = cut_prepared(prepared, port="virtual", options=options)
     assert {"aligned", "resumed"} <= {found.code for found in done.findings}
-    assert {run.sha256 for run in read_journal(journal)} == {job_digest(prepared.jobs[0])}
+    assert {run.sha256 for run in read_journal(journal)} == {prepared.jobs[0].sha256}
 
 
 def test_the_picture_is_that_of_the_moved_sheet(prepared, tmp_path):

@@ -632,7 +632,7 @@ def test_a_frame_leaves_the_sheet_fresh_and_a_cut_does_not() -> None:
     assert progress[-1].lines_acknowledged == FRAME.lines
     assert session.state.loaded is None
     session.cut(JOB)
-    assert session.state.loaded == "rows.nc"
+    assert str(session.state.loaded) == "rows.nc"
 
 
 def test_after_a_restart_of_its_own_a_job_begins_where_somebody_says() -> None:

@@ -11,7 +11,7 @@ from wires import FakeWire
 
 from miurafab.errors import InputError, JobStopped, OptionError
 from miurafab.gcode.job import Job
-from miurafab.machine.journal import job_digest, read_journal
+from miurafab.machine.journal import read_journal
 from miurafab.machine.planning import PLACES, SendOptions, plan_job
 from miurafab.machine.resume import from_stroke, resume
 from miurafab.machine.sender import deliver
@@ -166,7 +166,7 @@ def test_what_was_left_out_stays_left_out_when_the_job_is_resumed(tmp_path):
         plan_job(job, MACHINE, resumption=rest), new_wire(), StopSignals(), journal_path=journal
     )
     (run,) = read_journal(journal)
-    assert (run.chosen, run.from_line, run.sha256) == (True, rest.line, job_digest(job))
+    assert (run.chosen, run.from_line, run.sha256) == (True, rest.line, job.sha256)
     begun = replace(run, taken=9, line=rest.line + 2, ended=None)
     assert resume(job, MACHINE, [begun]).stroke == 99
 

@@ -12,7 +12,7 @@ from disk import killed_at
 from miurafab.errors import InputError, MachineError
 from miurafab.gcode.job import Job
 from miurafab.machine.append_log import DurableFile
-from miurafab.machine.journal import Journal, job_digest, read_journal
+from miurafab.machine.journal import Journal, read_journal
 from miurafab.machine.transcript import Transcript
 
 JOB = Job("sheet-01.nc", "G0X1\nG0X2\n")
@@ -63,7 +63,7 @@ def test_a_journal_is_read_back(tmp_path: Path) -> None:
     (run,) = read_journal(path)
     assert (run.taken, run.line, run.seconds) == (2, 2, 0.1)
     assert (run.ended, run.why) == ("done", "all of it")
-    assert (run.job, run.sha256, run.lines) == ("sheet-01.nc", job_digest(JOB), 2)
+    assert (run.job, run.sha256, run.lines) == ("sheet-01.nc", JOB.sha256, 2)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")

@@ -19,7 +19,7 @@ from miurafab.errors import GcodeError, InputError, JobStopped, MachineError
 from miurafab.gcode.interpreter import parse_program
 from miurafab.gcode.job import Job
 from miurafab.gcode.program import strokes
-from miurafab.machine.journal import JournalRun, job_digest, read_journal
+from miurafab.machine.journal import JournalRun, read_journal
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.resume import Resumption, from_stroke, resume
 from miurafab.machine.sender import deliver
@@ -193,7 +193,7 @@ def test_what_is_stated_after_a_kill_is_what_the_machine_can_have_made() -> None
     """80 strokes of 10 mm at 3000 mm/min, cut down after the 30th: not all that a wire carries."""
     text = "M4 S0\n" + "".join(f"G0 X5 Y{n}\nG1 X15 S500 F3000\n" for n in range(80)) + "M5\n"
     job = Job("dashes.nc", text)
-    left = JournalRun(job.name, job_digest(job), MACHINE.name, "p", 162, taken=61, line=61)
+    left = JournalRun(job.name, job.sha256, MACHINE.name, "p", 162, taken=61, line=61)
     rest = resume(job, MACHINE, [left])
     assert rest.stroke == 19
     # In a second at most 7 strokes of 0.1 s, with rapids; 21 moves held, and 128 bytes.
@@ -270,7 +270,7 @@ def test_a_rest_is_the_whole_where_nothing_can_stand_before_it() -> None:
 
 
 def record(job: Job, **changes: object) -> JournalRun:
-    made = JournalRun(job.name, job_digest(job), MACHINE.name, "virtual", job.line_count)
+    made = JournalRun(job.name, job.sha256, MACHINE.name, "virtual", job.line_count)
     return replace(made, ended="failed", **changes)
 
 

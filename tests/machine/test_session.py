@@ -27,7 +27,7 @@ from miurafab.errors import (
 )
 from miurafab.machine.jog_pad import JogPad
 from miurafab.machine.keys import JOG_CANCEL
-from miurafab.machine.known_controller import PortSetup
+from miurafab.machine.known_controller import Burnt, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, claim, holder_of, owner_of, this_owner
 from miurafab.machine.resume import Resumption
@@ -428,7 +428,7 @@ def test_a_sheet_that_is_burnt_takes_no_second_job() -> None:
     here, wire = session()
     wire.blocks = True
     here.cut(JOB)
-    assert here.state.loaded == "rows.nc"
+    assert here.state.loaded == Burnt("rows.nc", JOB.sha256)
     burnt = len(wire.device.beam_log)
     fresh = r"rows\.nc has burnt on the sheet in the machine; put in fresh material and say so"
     with pytest.raises(PersonNeeded, match=fresh):
@@ -444,13 +444,13 @@ def test_no_machine_turns_a_sheet_over_by_itself() -> None:
     here, wire = session()
     wire.blocks = True
     fed = replace(MACHINE, bed=replace(MACHINE.bed, roll_fed=True))
-    front = replace(JOB, machine=fed, job=replace(JOB.job, name="sheet-01.nc"))
+    front = replace(JOB, back="b")
     for machine in (MACHINE, fed):
-        here.known.loaded = "sheet-01-back.nc"
-        with pytest.raises(PersonNeeded, match=r"turn the sheet over, left to right, .* say so"):
-            here.cut(replace(front, machine=machine))
-    here.known.loaded = "sheet-02-back.nc"
-    assert here.cut(front).lines == 15
+        for burnt, which in (("b", "turn the sheet over"), ("other", "whose back is")):
+            here.known.loaded = Burnt("sheet-01-back.nc", burnt)
+            with pytest.raises(PersonNeeded, match=rf"{which}.* by its three holes and say so"):
+                here.cut(replace(front, machine=machine))
+    assert here.cut(replace(front, machine=fed, back=None)).lines == 15
 
 
 @pytest.mark.parametrize("dialect", ["marlin", "hpgl"])

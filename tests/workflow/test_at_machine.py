@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from miurafab.errors import PersonNeeded
-from miurafab.machine.known_controller import MachineState
+from miurafab.gcode.job import Job
+from miurafab.machine.known_controller import Burnt, MachineState
 from miurafab.workflow import at_machine
 from miurafab.workflow.at_machine import Operator
 from miurafab.workflow.cut import prepare
@@ -55,22 +56,34 @@ def test_an_origin_that_is_moved_is_not_forgotten():
 
 @pytest.mark.parametrize(
     ("burnt", "what"),
-    [("line-back.nc", "turn the sheet over, left to right"), ("old.nc", "put in fresh material")],
+    [
+        (-1, "put in fresh material"),
+        (0, "turn the sheet over, left to right"),
+        (1, "put in the sheet whose back is burnt, turned over left to right"),
+    ],
 )
 def test_a_sheet_that_has_burnt_is_turned_over_or_changed(tmp_path, burnt, what):
+    """A back of the same name in another job is another one."""
     job = tmp_path / "line.nc"
     job.write_text("M4 S0\nG0 X5\nG1 X15 S500 F3000\nM5\n")
-    process = Held()
-    operator = Operator(process, prepare(job), CutOptions())
-    operator.busy, process.state = "", replace(HERE, loaded=burnt)
-    with pytest.raises(PersonNeeded, match=f"{burnt} has burnt on the sheet .*; {what}.* say so"):
+    process, prepared = Held(), prepare(job)
+    backs = [Job("line-back.nc", f"G0 X{x}\n") for x in (5, 6)]
+    operator = Operator(process, prepared, CutOptions())
+    loaded = Burnt("line-back.nc", backs[burnt].sha256)
+    operator.busy, process.state = "", replace(HERE, loaded=loaded)
+    if burnt >= 0:
+        operator.prepared = replace(
+            prepared, jobs=(backs[0], *prepared.jobs), dry_runs=prepared.dry_runs * 2
+        )
+        operator.choose(2)
+    with pytest.raises(PersonNeeded, match=f"line-back.nc has burnt on .*; {what}.* say so"):
         operator.arm()
     assert not operator.armed
     assert operator.wants_material.startswith(what)
     machine = operator.prepared.machine
     bed = replace(machine.bed, roll_fed=True)
     operator.prepared = replace(operator.prepared, machine=replace(machine, bed=bed))
-    assert bool(operator.wants_material) == what.startswith("turn")  # no machine does that itself
+    assert bool(operator.wants_material) == (burnt >= 0)  # no machine does that itself
 
 
 def test_what_will_burn_is_found_once_a_sheet(tmp_path, monkeypatch):

@@ -20,6 +20,7 @@ from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import cut_prepared
 from miurafab.workflow.material_change import WAITS, at_pause, needs_person
 from miurafab.workflow.multi_machine import share_sheets
+from miurafab.workflow.sheet_plans import plan_sheets
 
 
 @pytest.fixture
@@ -70,6 +71,7 @@ def both_sides(job):
         tuple(dataclasses.replace(each, name=name) for each, name in zip(of, called, strict=True))
         for of, called in ((job.jobs, names), (job.dry_runs, [name[:-3] for name in names]))
     )
+    jobs = tuple(dataclasses.replace(each, text=f"({each.name})\n{each.text}") for each in jobs)
     return dataclasses.replace(job, jobs=jobs, dry_runs=seen)
 
 
@@ -78,6 +80,10 @@ def test_a_sheet_that_is_worked_from_both_sides_is_turned_over_in_between(both_s
         cut_prepared(both_sides, port="virtual", pause=True)
     with pytest.raises(PersonNeeded, match=r"Before sheet-02\.nc, put in fresh material"):
         cut_prepared(both_sides, port="virtual", sheets=[2, 3], pause=True)
+    with pytest.raises(PersonNeeded, match=r"Before sheet-01\.nc, put in the sheet whose back is"):
+        cut_prepared(both_sides, port="virtual", sheets=[3, 2], pause=True)
+    plans = dict(plan_sheets(both_sides, None, CutOptions()))
+    assert [plan.back for plan in plans.values()] == [None, both_sides.jobs[0].sha256, None]
 
 
 def test_a_machine_that_feeds_itself_asks_for_the_other_side_alone(both_sides, monkeypatch):
