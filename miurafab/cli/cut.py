@@ -215,6 +215,7 @@ def _share(
     with console.progress("cutting") as bar, terminal_keys() as keys:
 
         def before(number: int, port: str, over: Callable[[], bool]) -> bool:
+            keys.pressed()  # what was typed before is no answer
             console.note(
                 f"Sheet {number} of {len(prepared.jobs)} at {port}: {wanted(prepared, number)} "
                 "there, press Enter."
@@ -316,11 +317,12 @@ def _hint_at_resume(console: Console, prepared: Prepared) -> Iterator[None]:
 
 
 def _wait(console: Console, keys: Keys, request: str) -> None:
-    """Ask for Enter; the end of the input is nobody's."""
-    from miurafab.machine.keys import ConsoleKeys
+    """Ask for Enter; what was typed before is no answer, and the end of the input is nobody's."""
+    from miurafab.machine.keys import NoKeys
 
+    keys.pressed()
     console.note(request)
-    if isinstance(keys, ConsoleKeys):  # which can be looked at, and no signal ends a reading
+    if not isinstance(keys, NoKeys):
         while not {"\n", "\r"} & set(keys.pressed()):
             time.sleep(_LOOK_S)
     elif not sys.stdin.readline():

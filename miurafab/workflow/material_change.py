@@ -50,7 +50,10 @@ def at_pause(waits: bool, keys: Keys | None) -> AtPause:
 
 
 class MaterialChange:
-    """The material in each machine: one person puts it in, at one machine after another."""
+    """The material in each machine: one person puts it in, at one machine after another.
+
+    ``asks``: there is such a person.
+    """
 
     def __init__(
         self,
@@ -61,6 +64,7 @@ class MaterialChange:
         signals: StopSignals,
     ) -> None:
         self.missing = False
+        self.asks = before_sheet is not None
         self._waits = {port: needs_person(prepared, port, pause) for port in ports}
         self._before_sheet = before_sheet
         self._signals = signals

@@ -55,9 +55,10 @@ def share_sheets(
     """Cut the sheets of a job directory on the machines at ``ports``; returns the outcomes in the
     order of the sheets.
 
-    Before each further sheet of a machine ``before_sheet`` waits for fresh material there, in a
-    thread of that machine, and ends with False when the function that it gets says that nothing
-    is to be waited for; False (or no such function) leaves the sheet to another machine.
+    Before each further sheet of a machine, and with ``options.resume`` before each that was not
+    begun, ``before_sheet`` waits for fresh material there, in a thread of that machine, and ends
+    with False when the function that it gets says that nothing is to be waited for; False (or no
+    such function) leaves the sheet to another machine.
     ``on_start`` gets the port and each finding on where a sheet lies and begins there.
     ``on_progress`` gets the fraction done and a note when a sheet is done or has failed. A machine
     that fails is part of the answer. With ``options.resume`` each machine first resumes the sheet
@@ -158,8 +159,10 @@ class _Work:
                     number = (self._own[port] or self._left).popleft()
                 except IndexError:
                     return
+                fresh = self._options.resume and self._plans[number].resumption is None
+                further = done or (fresh and self._material.asks)
                 try:
-                    if done and not self._fresh_is_in(number, port, session):
+                    if further and not self._fresh_is_in(number, port, session):
                         self._left.appendleft(number)
                         return
                 except MiurafabError as error:

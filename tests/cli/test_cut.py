@@ -401,6 +401,25 @@ def test_enter_is_looked_for_where_the_keyboard_can_be_looked_at(monkeypatch, ca
     assert capsys.readouterr().err == "Press Enter.\n"
 
 
+def test_what_was_typed_while_a_sheet_was_cut_is_no_answer(run, three_sheets, monkeypatch, capsys):
+    """Enter that was pressed twice, or in impatience, would burn on the sheet of before."""
+    typed = Typing("\n\n", "x", "\n", "left")
+    monkeypatch.setattr(cut, "_LOOK_S", 0.0)
+    cut._wait(Console(), typed, "Press Enter.")
+    assert typed.left == ["left"]
+
+    keys = Typing("\n", "x", "\n", "left")
+
+    def share(prepared, ports, *_, before_sheet, **how):
+        before_sheet(2, ports[1], lambda: False)
+        return (Shared("sheet-01", ports[0], True, ""),)
+
+    monkeypatch.setattr("miurafab.machine.keys.terminal_keys", lambda: nullcontext(keys))
+    monkeypatch.setattr("miurafab.workflow.multi_machine.share_sheets", share)
+    run("cut", "job", "--port", "virtual", "--port", "virtual")
+    assert keys.left == ["left"]
+
+
 @pytest.mark.parametrize("lost", [False, True])
 def test_machines_that_share_a_job_ask_for_enter_in_the_terminal(
     run, three_sheets, monkeypatch, lost

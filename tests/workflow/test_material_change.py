@@ -201,6 +201,34 @@ def test_machines_that_share_a_job_wait_each_for_its_material(job, monkeypatch, 
     assert sorted(opened) == ["A", "B"]
 
 
+def test_a_machine_that_resumes_a_shared_job_asks_before_a_sheet_that_was_not_begun(
+    job, monkeypatch
+):
+    """The sheet of before may lie in it, burnt."""
+    cut_prepared(job, port="virtual", sheets=[1])
+
+    def apart(machine, port, name, *, signals, virtual_speed):
+        return session_here(machine, "virtual", name, signals=signals)
+
+    monkeypatch.setattr(multi_machine, "session_apart", apart)
+    monkeypatch.setattr(multi_machine, "suspending_signals", NoSignals)
+    job = dataclasses.replace(job, directory=SimpleNamespace(most_power=1.0, edits=()))
+    options = CutOptions(send=SendOptions(at=(0.0, 0.0)), resume=True)
+    asked = []
+
+    def before(number, port, signals):
+        asked.append(number)
+        return False
+
+    outcome = share_sheets(
+        job, ["A"], None, options, before_sheet=before, on_progress=lambda *a: None
+    )
+    assert (asked, [each.why for each in outcome]) == ([2], [WAITS, WAITS])
+    assert ended(job) == ["done"]
+    share_sheets(job, ["A"], None, options, on_progress=lambda *a: None)
+    assert ended(job) == ["done", "done"]  # nobody to ask: who began it has put it in
+
+
 class NoSignals:
     """Signals that never come; threads of a test cannot catch any."""
 
