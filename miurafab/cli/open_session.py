@@ -8,6 +8,7 @@ import os
 import queue
 import sys
 import threading
+from collections import deque
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
@@ -147,7 +148,6 @@ def _by_keys(operator: Operator) -> None:
 def _by_words(operator: Operator, console: Console) -> None:
     """Carry out lines of words; raises the error of the first that fails."""
     lines = _Lines()
-    line: str | None = None
     asked = ""
     while not operator.over:
         operator.take()
@@ -162,7 +162,9 @@ def _by_words(operator: Operator, console: Console) -> None:
         if asked and not operator.busy:
             _answer(console, line=asked, state=operator.state)
             asked = ""
-        line = lines.next() if line is None else line
+        line = lines.next(busy=bool(operator.busy), overtakes=bool(asked))
+        while lines.void:
+            _answer(console, said=f"'{lines.void.popleft()}' was stopped before it was begun.")
         if line is None:
             if lines.ended and not operator.busy:
                 return
@@ -171,12 +173,11 @@ def _by_words(operator: Operator, console: Console) -> None:
         elif line in _AT_ONCE:
             operator.press(_AT_ONCE[line])
             _answer(console, line=line, state=operator.state)
-            line = None
-        elif not operator.busy:
-            if line == "quit":
-                return
+        elif line == "quit":
+            return
+        else:
             _carry_out(operator, line)
-            asked, line = line, None
+            asked = line
 
 
 def _carry_out(operator: Operator, line: str) -> None:
@@ -253,10 +254,12 @@ def _xy(place: tuple[float, ...] | None) -> str:
 
 
 class _Lines:
-    """Lines of standard input, read without waiting; ``ended`` after the last was taken."""
+    """Lines of standard input, read without waiting; ``void`` are those that a stop overtook."""
 
     def __init__(self) -> None:
-        self.ended = False
+        self.void: deque[str] = deque()
+        self._whole = False
+        self._waiting: list[str] = []
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         # Not sys.stdin's own buffer, whose lock this thread would hold at the end of the program.
         threading.Thread(target=self._read, name="miurafab words", daemon=True).start()
@@ -271,14 +274,25 @@ class _Lines:
         self._lines.put(coming.decode("utf-8", "replace"))
         self._lines.put(None)
 
-    def next(self) -> str | None:
-        """The next line that is not empty, None if there is none yet."""
-        while not self.ended:
-            try:
+    @property
+    def ended(self) -> bool:
+        """Whether the last line was taken."""
+        return self._whole and not self._waiting
+
+    def next(self, *, busy: bool, overtakes: bool) -> str | None:
+        """The next line that is not empty and can be carried out now, None if there is none: while
+        the session is ``busy`` a word that acts at once, which ``overtakes`` the actions that wait.
+        """
+        with contextlib.suppress(queue.Empty):
+            while not self._whole:
                 line = self._lines.get_nowait()
-            except queue.Empty:
-                return None
-            self.ended = line is None
-            if line is not None and line.strip():
-                return " ".join(line.split())
+                self._whole = line is None
+                self._waiting += [" ".join(line.split())] if line and line.strip() else []
+        for place, line in enumerate(self._waiting[: None if overtakes else 1]):
+            if line in _AT_ONCE or not busy:
+                if line == "stop":
+                    self.void.extend(self._waiting[:place])
+                    del self._waiting[:place]
+                self._waiting.remove(line)
+                return line
         return None

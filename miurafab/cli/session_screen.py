@@ -15,7 +15,7 @@ from collections.abc import Callable
 from typing import TextIO
 
 from miurafab.errors import MiurafabError
-from miurafab.machine.keys import DOWN, KEYS, LEFT, PAGE_DOWN, PAGE_UP, RIGHT, UP
+from miurafab.machine.keys import DOWN, KEYS, LEFT, PAGE_DOWN, PAGE_UP, RESET, RIGHT, UP
 from miurafab.machine.known_controller import MachineState
 from miurafab.workflow.at_machine import STEPS, Operator
 from miurafab.workflow.dry_run import clock_text
@@ -61,7 +61,7 @@ class SessionScreen:
             if key == before and key in _WAYS:
                 continue
             try:
-                if self._typing is not None:
+                if self._typing is not None and KEYS.get(key) != RESET:
                     self._type(key)
                 else:
                     self._act(key)

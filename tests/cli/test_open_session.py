@@ -181,6 +181,21 @@ def test_what_follows_a_stopped_job_is_carried_out(words, monkeypatch):
     assert answers[-1]["state"]["position"][0] == 3.0
 
 
+def test_stop_overtakes_what_waits_for_the_end_of_a_job_and_makes_it_void(words, monkeypatch):
+    monkeypatch.setattr(InThread, "holds", True)
+    polls, poll = iter(range(1000)), InThread.poll
+    monkeypatch.setattr(InThread, "poll", lambda self: poll(self) if next(polls) >= 0 else None)
+    lines = "start\nstatus\nstart\nhold\nstop\njog x3\n"
+    done = words(lines, "virtual", "line.nc", "--json")
+    answers = [json.loads(line) for line in done.stdout.splitlines()]
+    assert done.returncode == 0
+    assert InThread.made.keys == " q"
+    assert InThread.made.asked == ["open", "cut", "jog"]
+    said = [answer["said"] for answer in answers if "said" in answer]
+    assert "'status' was stopped before it was begun." in said
+    assert [each["line"] for each in answers if "line" in each] == ["hold", "stop", "jog x3"]
+
+
 def test_a_signal_that_ends_the_session_is_named(words, monkeypatch):
     poll = InThread.poll
 
@@ -258,6 +273,12 @@ def test_a_line_for_the_controller_is_typed_seen_and_sent(screen):
     asked = list(InThread.made.asked)
     screen.press(":  \n")
     assert InThread.made.asked == asked
+
+
+def test_a_line_that_is_being_typed_keeps_no_reset_back(screen):
+    screen.press(":G1 q\x18 X5")
+    assert InThread.made.keys == "\x18"
+    assert "line: G1 q X5_" in seen(screen)
 
 
 def test_any_other_key_disarms(screen):
