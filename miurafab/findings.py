@@ -64,7 +64,7 @@ RULES = {
     "curved-lines": Rule("note", "curved lines of a drawing, which are straight lines here"),
     "joined-ends": Rule("note", "a drawing whose lines were joined over gaps"),
     "lost-lines": Rule("warning", "lines of a drawing that are not in the pattern"),
-    "loose-parts": Rule("note", "parts of a drawing that lie loose inside a facet"),
+    "loose-parts": Rule("note", "parts of a drawing, or ends of cuts, in the middle of a facet"),
     "holes": Rule("note", "parts of a drawing without paper, bounded by borders alone"),
     "unfolded": Rule("note", "a flat pattern that is computed from the folded form of its file"),
     "rounded": Rule("note", "a file of few digits, whose two forms differ by their rounding"),
@@ -101,6 +101,9 @@ RULES = {
     "bow-tie": Rule("refusal", "a facet whose own sides cross"),
     "dented": Rule("warning", "a quad facet that is not convex"),
     "both-sides": Rule("warning", "a facet that lies on both sides of an edge, and is no polygon"),
+    "touches-itself": Rule(
+        "warning", "a facet whose border meets itself, or without area, which is no polygon"
+    ),
     "steep-folds": Rule("warning", "creases that fold by more than 165 degrees"),
     "much-paper": Rule("warning", "a sheet of more than four times the area of the target"),
     "coverage": Rule("warning", "a sheet that covers less than 95 % of the target"),

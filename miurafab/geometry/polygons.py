@@ -53,6 +53,28 @@ def connected_parts(faces: Ints) -> tuple[int, Ints]:
     return len(first), np.argsort(np.argsort(first))[part].astype(np.int64)
 
 
+def touching_themselves(faces: Ints) -> Ints:
+    """(n,) which of ``faces`` (F, k) have one corner twice."""
+    ordered = np.sort(faces, axis=1)
+    again = (ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)
+    return np.flatnonzero(again.any(axis=1))
+
+
+def no_polygons(points: Floats, faces: Ints) -> Ints:
+    """(n,) which of ``faces`` (F, k) at ``points`` (V, 2) have no area, run clockwise, or have a
+    border that meets itself.
+    """
+    count = (faces >= 0).sum(axis=1)
+    bad = np.zeros(len(faces), dtype=bool)
+    for corners in np.unique(count):
+        own = np.flatnonzero(count == corners)
+        shapes = points[faces[own, :corners]]
+        bad[own] = signed_areas(shapes) <= 0
+        if corners >= 3:
+            bad[own] |= ~shapely.is_valid(shapely.polygons(shapes))
+    return np.flatnonzero(bad)
+
+
 def sides_and_diagonals(faces: Ints) -> Iterator[tuple[Ints, Ints]]:
     """For each pair of corners: the faces (n,) that have both, and the two vertices (n, 2)."""
     for pair in itertools.combinations(range(faces.shape[1]), 2):

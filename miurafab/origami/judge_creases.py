@@ -23,11 +23,12 @@ from miurafab.geometry.polygons import (
     facet_areas,
     facet_normals,
     filled,
+    no_polygons,
     signed_areas,
 )
 from miurafab.geometry.quads import QuadGrid
 from miurafab.origami.crease_pattern import UNCREASED, CreasePattern
-from miurafab.origami.invariants import EXACT, Residuals
+from miurafab.origami.invariants import EXACT, Residuals, crossed_facets
 from miurafab.origami.unfold import FLAT_ANGLE
 
 _ROUNDINGS = 64
@@ -171,10 +172,30 @@ def _facets(pattern: CreasePattern) -> Iterator[Finding]:
     }
     if both:
         yield _finding("both-sides", both, "edge")
+    bad = no_polygons(pattern.vertices_coords, faces)
+    if len(bad):
+        told = np.concatenate([turned, left[list(both)], crossed_facets(pattern)])
+        bad = np.setdiff1d(bad, told)
+    if len(bad):
+        touching = {int(f): _touching(f, faces[f][faces[f] >= 0]) for f in bad}
+        yield _finding("touches-itself", touching, "facet")
     if pattern.grid is not None:
         yield from _off_the_grid(faces, QuadGrid(*pattern.grid))
     elif pattern.cells is not None:
         yield from _off_their_cells(pattern, pattern.cells)
+
+
+def _touching(facet: int, corners: Ints) -> str:
+    """What is told of a ``facet`` that is no polygon, though none of its sides cross."""
+    vertices, times = np.unique(corners, return_counts=True)
+    where, way = "touches itself, or has no area", "Move its corners apart, or leave it out."
+    if (times > 1).any():
+        where = f"touches itself at vertex {vertices[times > 1][0]}"
+        way = (
+            "Join what hangs there to another side of the facet by a flat edge (F), or leave "
+            "`faces_vertices` out of a file without a folded form."
+        )
+    return f"Facet {facet} {where}: it is no polygon, and cannot be laid out on sheets. {way}"
 
 
 def _off_the_grid(faces: Ints, grid: QuadGrid) -> Iterator[Finding]:

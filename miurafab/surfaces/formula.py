@@ -25,6 +25,7 @@ import numpy as np
 
 from miurafab.errors import TargetError, UnitError
 from miurafab.surfaces.function import SampledSurface, from_function
+from miurafab.units import as_float
 
 LONGEST = 500
 """Characters of a formula."""
@@ -102,7 +103,7 @@ def read_formula(text: str, variables: tuple[str, ...] = ()) -> Formula:
 def computed(value: str | float) -> float:
     """A number, or a formula without variables such as ``2*pi``. Raises ``UnitError``."""
     if not isinstance(value, str):
-        return float(value)
+        return as_float(value)
     try:
         return float(read_formula(value)({}))
     except TargetError as fault:

@@ -482,6 +482,32 @@ def test_a_facet_on_both_sides_of_an_edge_is_told() -> None:
     assert said(both)[0].endswith(" The same kind of fault is at 1 more edge (8).")
 
 
+def test_a_facet_that_touches_itself_is_told() -> None:
+    """`sheets` refused it and sent to `check`, which called it sound."""
+    points = np.array([[0.0, 0], [3, 0], [3, 3], [0, 3], [2, 1], [1, 2], [6, 0], [4, 0]])
+    ring = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [4, 5], [5, 0]])
+    window = CreasePattern(
+        points[:6], ring, np.full(7, "B"), np.zeros(7), np.array([[0, 1, 2, 3, 0, 5, 4]])
+    )
+    assert said(window)[0] == (
+        "touches-itself: Facet 0 touches itself at vertex 0: it is no polygon, and cannot be laid "
+        "out on sheets. Join what hangs there to another side of the facet by a flat edge (F), or "
+        "leave `faces_vertices` out of a file without a folded form."
+    )
+    flat = CreasePattern(
+        points[[0, 1, 2, 6, 7]],
+        np.array([[0, 1], [1, 2], [2, 0], [1, 3], [3, 4], [4, 1]]),
+        np.full(6, "B"),
+        np.zeros(6),
+        np.array([[0, 1, 2], [1, 3, 4]]),
+    )
+    assert said(flat)[0].startswith(
+        "touches-itself: Facet 1 touches itself, or has no area: it is no polygon,"
+    )
+    bow = replace(window, vertices_coords=points[:6] + np.array([[0, 0]] * 4 + [[2, 0], [0, 0]]))
+    assert [line.split(":")[0] for line in said(bow)][:1] == ["bow-tie"]
+
+
 def measured(**values: object) -> Measurements:
     return Measurements(facets=1, vertices=4, min_edge_mm=1.0, overlaps=0, **values)
 

@@ -66,6 +66,11 @@ def test_signs_and_powers_bind_as_in_mathematics(text, value):
     assert computed(text) == pytest.approx(value, rel=1e-14)
 
 
+def test_a_whole_number_of_more_digits_than_a_float_has_is_infinite():
+    """A design file with 400 digits ended with an OverflowError."""
+    assert computed(10**400) == math.inf
+
+
 @pytest.mark.parametrize(
     ("formula", "told"),
     [

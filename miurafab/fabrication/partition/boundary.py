@@ -34,15 +34,9 @@ class Boundary:
         return (self, *self.holes)
 
 
-def is_pinched(pattern: CreasePattern) -> bool:
-    """Whether two loops of the border of the pattern meet in a vertex."""
-    border = (pattern.edges_faces >= 0).sum(axis=1) == 1
-    return bool((np.bincount(pattern.edges_vertices[border].ravel()) > 2).any())
-
-
 def boundaries(pattern: CreasePattern, face_patch: Ints) -> list[Boundary]:
     """The boundary of each patch of ``face_patch`` (F,), by patch id, each loop from its lowest
-    edge on. No patch may be pinched.
+    edge on. Where a patch touches itself in a vertex two loops meet, as no loop has one twice.
     """
     face, corner = np.nonzero(pattern.faces_vertices >= 0)
     edge = pattern.faces_edges[face, corner]
@@ -55,9 +49,11 @@ def boundaries(pattern: CreasePattern, face_patch: Ints) -> list[Boundary]:
     patch, edge, tail = patch[border], edge[border], tail[border]
     head = pattern.edges_vertices[edge].sum(axis=1) - tail
     vertices = len(pattern.vertices_coords)
-    keys = patch * vertices + tail
-    order = np.argsort(keys)
-    following = order[np.searchsorted(keys, patch * vertices + head, sorter=order)].tolist()
+    # the n-th side that ends at a vertex is followed by the n-th that starts there
+    starts = np.argsort(patch * vertices + tail, kind="stable")
+    stops = np.argsort(patch * vertices + head, kind="stable")
+    following = np.empty(len(border), dtype=np.int64)
+    following[stops] = starts
     found: list[Boundary] = []
     left = np.ones(len(border), dtype=bool)
     bounds = np.searchsorted(patch, np.arange(int(face_patch.max(initial=-1)) + 2)).tolist()
@@ -68,13 +64,33 @@ def boundaries(pattern: CreasePattern, face_patch: Ints) -> list[Boundary]:
                 continue
             steps = [first]
             while following[steps[-1]] != first:
-                steps.append(following[steps[-1]])
+                steps.append(int(following[steps[-1]]))
             left[steps] = False
-            loops.append(Boundary(tail[steps], edge[steps]))
+            loops += [Boundary(tail[own], edge[own]) for own in _simple(tail, steps)]
         if len(loops) > 1:
             loops.sort(key=lambda loop: -_area(pattern, loop))
         found.append(Boundary(loops[0].vertices, loops[0].edges, tuple(loops[1:])))
     return found
+
+
+def _simple(tail: Ints, steps: list[int]) -> list[list[int]]:
+    """The closed walk along the sides ``steps`` from vertex to vertex (``tail``), parted into loops
+    that have no vertex twice, each from its lowest side on.
+    """
+    found = list[list[int]]()
+    open_, place = list[int](), dict[int, int]()
+    for step in steps:
+        vertex = int(tail[step])
+        if vertex in place:
+            loop = open_[place[vertex] :]
+            del open_[place[vertex] :]
+            for each in loop:
+                del place[int(tail[each])]
+            found.append(loop)
+        place[vertex] = len(open_)
+        open_.append(step)
+    found.append(open_)
+    return [loop[(low := loop.index(min(loop))) :] + loop[:low] for loop in found]
 
 
 def overlapping(pattern: CreasePattern, around: list[Boundary]) -> list[int]:

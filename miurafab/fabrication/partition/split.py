@@ -14,12 +14,11 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from miurafab.errors import LayoutError
 from miurafab.fabrication.options import LayoutOptions
-from miurafab.fabrication.partition.boundary import boundaries, is_pinched, overlapping
+from miurafab.fabrication.partition.boundary import boundaries, overlapping
 from miurafab.fabrication.partition.fit_box import Space, support
 from miurafab.fabrication.partition.grid_dp import Block, GridShape, split_grid
 from miurafab.fabrication.partition.improve import improved
@@ -35,7 +34,7 @@ from miurafab.fabrication.seams import inner_seams
 from miurafab.fabrication.tab_choice import border_tabs, choose_tabs
 from miurafab.fabrication.tabs import TabRegions, tab_regions
 from miurafab.geometry.arrays import Bools, Floats, Ints
-from miurafab.geometry.polygons import signed_areas, smallest_box
+from miurafab.geometry.polygons import no_polygons, smallest_box
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.piece import Piece
 from miurafab.profiles import Material
@@ -249,26 +248,19 @@ def check_facets(pattern: CreasePattern) -> None:
     loose = np.flatnonzero((pattern.edges_faces < 0).all(axis=1))
     if len(loose):
         raise LayoutError(f"Edge {loose[0]} of the pattern belongs to no facet; remove it.")
-    real = pattern.faces_vertices >= 0
-    count = real.sum(axis=1)
-    for corners in np.unique(count):
-        faces = np.flatnonzero(count == corners)
-        points = pattern.vertices_coords[pattern.faces_vertices[faces, :corners]]
-        bad = signed_areas(points) <= 0
-        if corners >= 3:
-            bad |= ~shapely.is_valid(shapely.polygons(points))
-        if bad.any():
-            raise LayoutError(
-                f"Facet {faces[bad][0]} is not a simple counter-clockwise polygon in the flat "
-                "pattern; run a check on the pattern before laying it out."
-            )
+    bad = no_polygons(pattern.vertices_coords, pattern.faces_vertices)
+    if len(bad):
+        raise LayoutError(
+            f"Facet {bad[0]} is not a simple counter-clockwise polygon in the flat pattern; run a "
+            "check on the pattern before laying it out."
+        )
 
 
 def _fits_whole(piece: Piece, tabs: StandingTabs, space: Space) -> bool:
     """Whether a piece with ``tabs`` on its border fits and can be one patch."""
     pattern = piece.pattern
     points = np.concatenate([pattern.vertices_coords, tabs.points[tabs.present]])
-    if space.turn(points) is None or is_pinched(pattern):
+    if space.turn(points) is None:
         return False
     around = boundaries(pattern, np.zeros(len(piece.facets), dtype=np.int64))
     return not overlapping(pattern, around)

@@ -29,12 +29,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from miurafab.errors import PatternError
 from miurafab.files import Reading, parse_json, read_text, write_text
 from miurafab.findings import Finding
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Ints
 from miurafab.geometry.polygons import (
     connected_parts,
 )
@@ -70,13 +69,11 @@ from miurafab.origami.formats.folded_only import (
     told_of_unfolding,
     unfolded_pattern,
 )
-from miurafab.origami.formats.line_crossings import lines_cross
-from miurafab.origami.formats.loose_parts import LoosePartsError
 from miurafab.origami.formats.planar_graph import (
+    are_lines,
     enclosed_facets,
     oriented,
     pattern_from_lines,
-    sides_within_a_facet,
 )
 from miurafab.origami.formats.target_frame import (
     exact_frames,
@@ -209,19 +206,6 @@ def read_further_frames(path: Path) -> tuple[FurtherFrame, ...]:
         return further_frames(exact_frames(document, text) if type(document) is dict else document)
 
 
-def _are_lines(flat: Floats, edges: Ints, assignment: NDArray[np.str_]) -> bool:
-    """Whether the ``edges`` of a file without facets are lines of a drawing, of which facets are
-    yet to be made: they cross, or some lie loose inside a facet, or at the end of a line there.
-    """
-    if lines_cross(flat, edges):
-        return True
-    try:
-        faces = enclosed_facets(flat, edges, assignment)
-    except LoosePartsError:
-        return True
-    return bool(sides_within_a_facet(faces, edges, len(flat)).any())
-
-
 def parse_fold(document: Any) -> CreasePattern:
     """The pattern in a parsed FOLD document. Raises ``PatternError`` naming the key at fault."""
     if not isinstance(document, dict):
@@ -238,7 +222,7 @@ def parse_fold(document: Any) -> CreasePattern:
     own = fold_angles_in(key, assignment, np.nan)
     unsized = told_without_sizes(key, assignment, own)
     given = "faces_vertices" in key
-    if not given and len(frames) == 1 and _are_lines(flat, edges, assignment):
+    if not given and len(frames) == 1 and are_lines(flat, edges, assignment):
         drawn = pattern_from_lines(CreaseLines(flat[edges], assignment, own))
         return replace(drawn, told=(*drawn.told, *unsized))
     faces = faces_in(key) if given else enclosed_facets(flat, edges, assignment)

@@ -1,68 +1,128 @@
-"""Parts of a drawing that lie loose inside a facet, such as windows and closed creases.
+"""Parts of a drawing in the middle of a facet: windows, closed creases, and slits that end there.
 
-A facet with a part inside is no polygon. Two flat lines join each such part to what is left and
-right of it: one from its corner that is farthest to the left, straight to the left up to the first
-line, and one to the right. They run inside the facet alone and cut it into polygons.
+A facet with a part inside is no polygon, nor is one whose border meets itself: at the end of a
+slit, or at the corner of a window that touches another line. Flat lines make polygons of it. Two
+join a loose part to what is left and right of it: one from its corner that is farthest to the left,
+straight to the left up to the first line, and one to the right. One line goes on from a part that
+hangs at one vertex: straight on from the end of a slit, else to the left or to the right. They run
+inside the facet alone.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.boxes import meeting_pairs
-from miurafab.geometry.polygons import filled
+from miurafab.geometry.connected import components
+from miurafab.geometry.polygons import filled, signed_areas, touching_themselves
 
+_Start = tuple[int, Floats]
+"""A vertex, and the direction of a flat line from there."""
 _AT_ONCE = 1_000_000
 """Corners of facets that are compared with a point in one step."""
 
 
-class LoosePartsError(PatternError):
-    """Parts lie loose inside facets; ``bridges`` (n, 2, 2) are the ends of lines that join them."""
-
-    def __init__(self, sentence: str, bridges: Floats, parts: int) -> None:
-        super().__init__(sentence)
-        self.bridges = bridges
-        self.parts = parts
-
-
-def refuse_loose_parts(points: Floats, sides: Ints, faces: Ints, piece: Ints) -> None:
-    """Refuse pieces that lie inside a facet of another: the first corner of each shows it.
-
-    ``points`` (V, 2), ``sides`` (E, 2), ``faces`` (F, k), ``piece`` (F,) of each. Raises
-    :class:`LoosePartsError`.
+@dataclass(frozen=True, eq=False)
+class InnerParts:
+    """The parts within facets: the number that lies ``loose``, that of ends of ``slits``, and that
+    of other parts ``hanging`` at one vertex; the ``bridges`` (b, 2, 2) are the ends of flat lines
+    that make polygons of the facets, and ``waits`` (E,) tells which sides are of a loose part.
     """
-    corner = faces[np.unique(piece, return_index=True)[1], 0]
-    depth = facets_around(points, faces, piece, points[corner])
-    loose = np.flatnonzero(depth)
-    if not len(loose):
-        return
-    x, y = points[corner[loose[0]]]
-    nested = loose[depth[loose] > 1]
-    what = f"A part of the drawing, at ({x:.6g}, {y:.6g}), lies loose inside a facet of another"
-    if len(nested):
-        x, y = points[corner[nested[0]]]
-        what = f"A part of the drawing, at ({x:.6g}, {y:.6g}), lies loose inside a loose part"
-    bridges = [] if len(nested) else [_beside(points, sides, faces[piece == at]) for at in loose]
-    raise LoosePartsError(
-        what + "; join them by a crease, or give a larger `tolerance`.",
-        np.array(bridges).reshape(-1, 2, 2),
-        len(loose),
-    )
+
+    loose: int
+    slits: int
+    hanging: int
+    bridges: Floats
+    waits: Bools
+
+    def refusal(self) -> PatternError:
+        """The error for a drawing in which they are not joined."""
+        x, y = self.bridges[0, 0]
+        what = "lies loose inside a facet" if self.loose else "hangs in a facet at one vertex"
+        return PatternError(
+            f"A part of the drawing, at ({x:.6g}, {y:.6g}), {what}; join it to the lines around "
+            "by a flat line (F), or give a larger `tolerance`."
+        )
 
 
-def _beside(points: Floats, sides: Ints, faces: Ints) -> Floats:
-    """(2, 2, 2) the flat lines to the left and to the right of a loose part of ``faces``."""
-    own = np.unique(faces[faces >= 0])
-    others = points[sides[~np.isin(sides, own).any(axis=1)]]
-    lines = []
-    for away in (-1.0, 1.0):
-        start = points[own[np.argmax(away * points[own, 0])]]
-        over = _passes(others[:, 0], others[:, 1], start)
-        reach = away * (_crossing(others[over, 0], others[over, 1], start[1]) - start[0])
-        lines.append([start, start + np.array([away * reach[reach > 0].min(), 0.0])])
-    return np.array(lines)
+def inner_parts(points: Floats, sides: Ints, faces: Ints) -> InnerParts:
+    """The parts inside of ``faces`` (F, k), of the plane graph of ``sides`` (E, 2) at ``points``
+    (V, 2).
+    """
+    used = np.unique(sides)
+    part = components(len(points), *sides.T)
+    _, first, order = np.unique(part[used], return_index=True, return_inverse=True)
+    part[used], first = order, used[first]
+    around = facets_around(points, faces, part[faces[:, 0]], points[first]) > 0
+    loose, slits, hanging = list[_Start](), list[_Start](), list[_Start]()
+    for number in np.flatnonzero(around).tolist():
+        ends = _slit_ends(points, sides[part[sides[:, 0]] == number])
+        slits += ends
+        if not ends:
+            own = used[part[used] == number]
+            for away in (-1.0, 1.0):
+                corner = int(own[np.argmax(away * points[own, 0])])
+                loose.append((corner, np.array([away, 0.0])))
+    for face in faces[touching_themselves(faces)]:
+        for is_end, start in _hanging(points, face):
+            (slits if is_end else hanging).append(start)
+    starts = (*loose, *slits, *hanging)
+    bridges = np.array([_bridge(points, sides, *start) for start in starts]).reshape(-1, 2, 2)
+    waits = around[part[sides[:, 0]]]
+    return InnerParts(len(loose) // 2, len(slits), len(hanging), bridges, waits)
+
+
+def _slit_ends(points: Floats, sides: Ints) -> list[_Start]:
+    """Where lines of ``sides`` end, and the directions straight on."""
+    vertices, degree = np.unique(sides, return_counts=True)
+    found = []
+    for end in vertices[degree == 1].tolist():
+        other = int(sides[(sides == end).any(axis=1)].sum()) - end
+        found.append((end, points[end] - points[other]))
+    return found
+
+
+def _hanging(points: Floats, face: Ints) -> Iterator[tuple[bool, _Start]]:
+    """From where a flat line goes on from each part that hangs at one vertex of ``face``, and at
+    which none hangs, and whether that is the end of a slit.
+    """
+    walk = face[face >= 0]
+    walk = np.roll(walk, -int(np.argmin(points[walk, 0])))
+    loops, bases, open_ = list[list[int]](), set[int](), list[int]()
+    for vertex in [*walk.tolist(), int(walk[0])]:
+        if vertex in open_:
+            at = open_.index(vertex)
+            loops.append(open_[at:])
+            bases.add(vertex)
+            del open_[at:]
+        open_.append(vertex)
+    for base, *others in loops:
+        corners = points[[base, *others]]
+        if bases.intersection(others) or signed_areas(corners[None])[0] > 0:
+            continue  # what hangs there comes first; the border around the facet does not hang
+        if len(others) == 1:
+            yield True, (others[0], corners[1] - corners[0])
+            continue
+        left, right = (int(np.argmax(away * corners[1:, 0])) for away in (-1.0, 1.0))
+        leftmost = corners[1 + left, 0] <= corners[0, 0]
+        away = np.array([-1.0 if leftmost else 1.0, 0.0])
+        yield False, (others[left if leftmost else right], away)
+
+
+def _bridge(points: Floats, sides: Ints, vertex: int, along: Floats) -> Floats:
+    """(2, 2) the line from a ``vertex`` ``along`` a direction to the first of ``sides``."""
+    others = points[sides[(sides != vertex).all(axis=1)]] - points[vertex]
+    height = along[0] * others[..., 1] - along[1] * others[..., 0]
+    passes = (height[:, 0] > 0) != (height[:, 1] > 0)
+    others, height = others[passes], height[passes]
+    part = height[:, 0] / (height[:, 0] - height[:, 1])
+    reach = (others[:, 0] + part[:, None] * (others[:, 1] - others[:, 0])) @ along / (along @ along)
+    return np.array([points[vertex], points[vertex] + reach[reach > 0].min() * along])
 
 
 def facets_around(points: Floats, faces: Ints, piece: Ints, places: Floats) -> Ints:

@@ -8,6 +8,7 @@ next side clockwise follows, so that the walk around each facet is counter-clock
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,14 +35,14 @@ from miurafab.origami.formats.crease_lines import (
     with_flat_lines,
 )
 from miurafab.origami.formats.line_crossings import lines_cross, split_lines
-from miurafab.origami.formats.loose_parts import LoosePartsError, facets_around, refuse_loose_parts
+from miurafab.origami.formats.loose_parts import InnerParts, facets_around, inner_parts
 from miurafab.origami.formats.rulings import rulings
 from miurafab.origami.formats.settled_parts import DrawnSides, SettledParts
 from miurafab.origami.formats.told import (
     lost_lines,
+    told_of_inner_parts,
     told_of_joining,
     told_of_lines,
-    told_of_loose_parts,
     told_of_rulings,
     torn_lines,
 )
@@ -57,6 +58,12 @@ SHORT = 1e-3
 SHORT_CURVED = 0.25
 """The same as a part of the tolerance of curves."""
 
+CUTS = ("B", "C")
+"""The letters of lines along which paper is cut, also where they end in the middle of a facet."""
+
+_ROUNDS = 30
+"""So often flat lines are drawn in facets that are no polygons; where parts hang on each other they
+are joined one after another."""
 _MOST_CORNERS = 20_000_000
 """Of all facets, were each as large as the largest: 160 MB."""
 # Of two lines on each other, the line of the higher rank is kept.
@@ -71,34 +78,26 @@ def pattern_from_lines(lines: CreaseLines, tolerance: float | None = None) -> Cr
     :data:`TOLERANCES` with which the fewest lines are left out. A mountain or valley of unknown
     angle is folded flat. Lines that bound no facet are left out, which
     :attr:`CreasePattern.told` tells. The parts of a drawing that lie apart are the pieces of the
-    pattern; one that lies loose inside a facet is joined to the lines around by two flat lines.
+    pattern; what lies loose inside a facet or ends there as a cut (B, C) is joined to the lines
+    around by flat lines (:mod:`miurafab.origami.formats.loose_parts`).
 
-    Raises :class:`~miurafab.errors.PatternError` if the lines enclose no facet, or if a part of
-    the drawing lies loose inside a part that does so itself.
+    Raises :class:`~miurafab.errors.PatternError` if the lines enclose no facet.
     """
     if not len(lines.ends):
         raise PatternError("The drawing holds no line.")
     if not (np.abs(lines.ends) < FARTHEST).all():
         raise too_far()
-    lines, loose = corners_at_ends(lines), 0
-    for again in (True, True, False):  # once for loose parts, and once for those at ends of lines
-        drawn = None
-        try:
-            near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
-            sides = split_lines(lines, near)
-            drawn = _joined(lines, sides)
-            if drawn.has_parts_at_ends:
-                _joined(lines, sides, cut_off=True)
-        except LoosePartsError as fault:
-            if again and len(fault.bridges):
-                lines, loose = with_flat_lines(lines, fault.bridges), loose + fault.parts
-                continue
-            if drawn is None:
-                raise
-        break
-    assert drawn is not None
-    if loose:
-        told += (told_of_loose_parts(loose),)
+    lines = corners_at_ends(lines)
+    near, told = (tolerance, ()) if tolerance is not None else _nearness(lines)
+    drawn = _joined(lines, split_lines(lines, near))
+    found: list[InnerParts] = []
+    while len(drawn.inner.bridges):
+        if len(found) == _ROUNDS:
+            raise drawn.inner.refusal()
+        found.append(drawn.inner)
+        lines = with_flat_lines(lines, drawn.inner.bridges)
+        drawn = _joined(lines, split_lines(lines, near))
+    told += told_of_inner_parts(found)
     if lines.curve is None:
         return replace(drawn.pattern, told=drawn.pattern.told + told)
     bent = rulings(drawn.pattern, lines.curve[drawn.source] >= 0)
@@ -116,7 +115,7 @@ def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
     short = max(SHORT * median, SHORT_CURVED * lines.curve_tolerance)
     first = split_lines(lines, TOLERANCES[0] * median)
     parts = SettledParts.of(first, short, ROUNDED * median)
-    chosen, least, refused = None, 0, None
+    chosen, least, refused = None, (0, 0.0), None
     for share in TOLERANCES:
         near = share * median
         sides = first if share == TOLERANCES[0] else split_lines(lines, near)
@@ -131,9 +130,10 @@ def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
         if share > TOLERANCES[0] and lines_cross(found.vertices_coords, found.edges_vertices):
             continue  # ends were moved over other lines
         lost = drawn.lost + int((drawn.lengths < short).sum())
-        if chosen is None or lost < least:
-            chosen, least = share, lost
-        if not least:
+        wrong = lost, drawn.inner.slits if share <= ROUNDED else math.inf
+        if chosen is None or wrong < least:
+            chosen, least = share, wrong
+        if not any(least) or (share >= ROUNDED and not least[0]):
             break
     if chosen is None:
         assert refused is not None
@@ -145,52 +145,42 @@ def _nearness(lines: CreaseLines) -> tuple[float, tuple[Finding, ...]]:
 @dataclass(frozen=True, eq=False)
 class _Joined:
     """A ``pattern`` that lines draw, of whose edges ``source`` (E,) are the lines; ``origin`` (2,)
-    is where its corner lies in the drawing, and ``lost`` the number of lines that are left out.
+    is where its corner lies in the drawing, ``lost`` the number of lines that are left out, and
+    ``inner`` what lies within facets.
     """
 
     pattern: CreasePattern
     source: Ints
     origin: Floats
     lost: int
+    inner: InnerParts
 
     @property
     def lengths(self) -> Floats:
         """(E,) the lengths of the edges."""
         return edge_lengths(self.pattern.vertices_coords, self.pattern.edges_vertices)
 
-    @property
-    def has_parts_at_ends(self) -> bool:
-        """Whether a line leads to a part inside a facet, which so lies on both sides of it."""
-        faces, edges = self.pattern.faces_vertices, self.pattern.edges_vertices
-        return bool(sides_within_a_facet(faces, edges, len(self.pattern.vertices_coords)).any())
 
-
-def _joined(lines: CreaseLines, drawn: DrawnSides, *, cut_off: bool = False) -> _Joined:
-    """The pattern of the sides that ``lines`` were cut into; parts of a facet to which a line leads
-    count as loose if they are ``cut_off``.
-    """
+def _joined(lines: CreaseLines, drawn: DrawnSides) -> _Joined:
+    """The pattern of the sides that ``lines`` were cut into."""
     every, line = drawn.sides, drawn.line
     stands_for = _without_doubles(every, line, lines.assignment)
-    rows = np.unique(stands_for)
-    while True:
-        points, sides, rows = _without_loose_ends(drawn.points, every, rows)
-        if not len(sides):
-            raise PatternError("The lines of the drawing enclose no facet; is the border there?")
-        faces = faces_of_plane_graph(points, sides)
-        within = sides_within_a_facet(faces, sides, len(points))
-        if not (cut_off and within.any()):
-            break
-        rows = rows[~within]
+    cut = np.isin(lines.assignment[line], CUTS)
+    points, sides, rows = _without_loose_ends(drawn.points, every, np.unique(stands_for), cut)
+    if not len(sides):
+        raise PatternError("The lines of the drawing enclose no facet; is the border there?")
+    faces = faces_of_plane_graph(points, sides)
+    if not len(faces):
+        raise PatternError("The lines of the drawing enclose no facet; is the border there?")
     letter = lines.assignment[line[rows]]
     pieces, piece = connected_parts(faces)
     whole = without_holes(faces, piece, sides, letter, len(points))
     areas = np.abs(signed_areas(points[filled(faces)]))
     holes = areas[~whole] / areas.sum()
     faces, piece = faces[whole], piece[whole]
-    if pieces > 1:
-        refuse_loose_parts(points, sides, faces, piece)
+    inner = inner_parts(points, sides, faces)
     count = _sides_of_faces(faces, sides, len(points))
-    keep = count > 0
+    keep, there = count > 0, rows[(count > 0) | inner.waits]
     sides, rows, letter, count = sides[keep], rows[keep], letter[keep], count[keep]
     source = line[rows]
     used = np.unique(sides)
@@ -201,7 +191,7 @@ def _joined(lines: CreaseLines, drawn: DrawnSides, *, cut_off: bool = False) -> 
     flat_folded = np.select([letter == "M", letter == "V"], [-np.pi, np.pi], 0.0)
     angle = lines.fold_angle[source]
     angle = np.where(np.isnan(angle) | (count == 1), flat_folded, angle)
-    stands_for = np.where(np.isin(stands_for, rows), stands_for, -1)
+    stands_for = np.where(np.isin(stands_for, there), stands_for, -1)
     lengths = edge_lengths(drawn.points, every)
     gone = np.flatnonzero(stands_for < 0)
     middles = drawn.points[every[gone]].mean(axis=1)
@@ -221,7 +211,7 @@ def _joined(lines: CreaseLines, drawn: DrawnSides, *, cut_off: bool = False) -> 
     )
     lost = int(lost_lines(lines, line, stands_for).sum())
     lost += int(torn_lines(lines, line, stands_for, lengths).sum())
-    return _Joined(pattern, source, origin, lost)
+    return _Joined(pattern, source, origin, lost, inner)
 
 
 def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
@@ -244,7 +234,8 @@ def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
     following = order[before][twin]
     loop = components(count, np.arange(count), following)
     cross = points[tail, 0] * points[head, 1] - points[tail, 1] * points[head, 0]
-    inside = np.flatnonzero(np.bincount(loop, cross) > 0)
+    alone = loop != loop[twin]  # a walk along which each side is gone both ways encloses nothing
+    inside = np.flatnonzero((np.bincount(loop, cross) > 0) & (np.bincount(loop, alone) > 0))
     start = np.unique(loop, return_index=True)[1]
     at = start[inside]
     if not len(at):
@@ -271,15 +262,34 @@ def enclosed_facets(flat: Floats, edges: Ints, assignment: NDArray[np.str_]) -> 
 
     Raises :class:`~miurafab.errors.PatternError`, also where a part lies loose inside a facet.
     """
+    faces, inner = _enclosed(flat, edges, assignment)
+    if inner.waits.any():
+        raise inner.refusal()
+    return faces
+
+
+def are_lines(flat: Floats, edges: Ints, assignment: NDArray[np.str_]) -> bool:
+    """Whether the ``edges`` of a file without facets are lines of a drawing, of which facets are
+    yet to be made: they cross, one has no length, or a part lies in the middle of a facet.
+
+    Raises :class:`~miurafab.errors.PatternError` as :func:`enclosed_facets`.
+    """
+    if (edges[:, 0] == edges[:, 1]).any() or lines_cross(flat, edges):
+        return True
+    return len(_enclosed(flat, edges, assignment)[1].bridges) > 0
+
+
+def _enclosed(flat: Floats, edges: Ints, assignment: NDArray[np.str_]) -> tuple[Ints, InnerParts]:
     if edges.max() >= len(flat):
         raise PatternError("'edges_vertices' refers to a vertex that does not exist.")
+    long = edges[:, 0] != edges[:, 1]
+    edges, assignment = edges[long], assignment[long]
     faces = faces_of_plane_graph(flat, edges)
     if not len(faces):
         raise PatternError("'faces_vertices' is missing and 'edges_vertices' encloses no facet.")
     piece = connected_parts(faces)[1]
-    whole = without_holes(faces, piece, edges, assignment, len(flat))
-    refuse_loose_parts(flat, edges, faces[whole], piece[whole])
-    return faces[whole]
+    faces = faces[without_holes(faces, piece, edges, assignment, len(flat))]
+    return faces, inner_parts(flat, edges, faces)
 
 
 def oriented(flat: Floats, faces: Ints) -> Ints:
@@ -322,14 +332,16 @@ def _without_doubles(sides: Ints, source: Ints, assignment: NDArray[np.str_]) ->
     return found
 
 
-def _without_loose_ends(points: Floats, every: Ints, rows: Ints) -> tuple[Floats, Ints, Ints]:
+def _without_loose_ends(
+    points: Floats, every: Ints, rows: Ints, cut: Bools
+) -> tuple[Floats, Ints, Ints]:
     """Vertices, sides and their ``rows`` in ``every`` side, without the sides that end at a vertex
-    of no other side, and without unused points.
+    of no other side and are no ``cut``, and without unused points.
     """
     while True:
         sides = every[rows]
         degree = np.bincount(sides.ravel(), minlength=len(points))
-        firm = (degree[sides] > 1).all(axis=1)
+        firm = (degree[sides] > 1).all(axis=1) | cut[rows]
         if firm.all():
             break
         rows = rows[firm]
@@ -344,17 +356,10 @@ def without_holes(
 ) -> Bools:
     """(F,) all but the facets that only border lines enclose; in a piece of only such, all."""
     face, side = _face_sides(faces, sides, vertices)
-    cut = np.isin(letter[side], ("B", "C"))
+    cut = np.isin(letter[side], CUTS)
     creased = np.bincount(face, ~cut, minlength=len(faces)) > 0
     bare = np.bincount(piece, creased) == 0
     return np.asarray(creased | bare[piece])
-
-
-def sides_within_a_facet(faces: Ints, sides: Ints, vertices: int) -> Bools:
-    """(E,) the sides of which one facet lies on both sides: they lead to a part inside of it."""
-    face, side = _face_sides(faces, sides, vertices)
-    key, count = np.unique(face * len(sides) + side, return_counts=True)
-    return np.isin(np.arange(len(sides)), key[count > 1] % len(sides))
 
 
 def _sides_of_faces(faces: Ints, sides: Ints, vertices: int) -> Ints:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from miurafab.findings import Finding
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.formats.crease_lines import CreaseLines
+from miurafab.origami.formats.loose_parts import InnerParts
 
 _OVERSHOOT = 0.05
 """Of a line, so much may reach over the last line that it crosses, and is not told."""
@@ -115,14 +116,43 @@ def told_of_joining(near: float) -> Finding:
     )
 
 
-def told_of_loose_parts(count: int) -> Finding:
-    """What is told of the flat lines that join parts which lie loose inside a facet."""
-    lies, them = ("lies", "it") if count == 1 else ("lie", "each")
-    return Finding(
-        "loose-parts",
-        f"{_many(count, 'part')} of the drawing {lies} loose inside a facet: two flat lines (F) "
-        f"join {them} to the lines around.",
+def told_of_inner_parts(rounds: Sequence[InnerParts]) -> tuple[Finding, ...]:
+    """What is told of the flat lines that make polygons of facets, in one round after another."""
+    loose, slits, hanging = (
+        (
+            sum(counts)
+            for counts in zip(
+                *((each.loose, each.slits, each.hanging) for each in rounds), strict=True
+            )
+        )
+        if rounds
+        else (0, 0, 0)
     )
+    return tuple(_told_of_inner_parts(loose, slits, hanging))
+
+
+def _told_of_inner_parts(loose: int, slits: int, hanging: int) -> Iterator[Finding]:
+    if loose:
+        lies, them = ("lies", "it") if loose == 1 else ("lie", "each")
+        yield Finding(
+            "loose-parts",
+            f"{_many(loose, 'part')} of the drawing {lies} loose inside a facet: two flat lines "
+            f"(F) join {them} to the lines around.",
+        )
+    if slits:
+        them = "it" if slits == 1 else "each"
+        yield Finding(
+            "loose-parts",
+            f"{_many(slits, 'end')} of cuts {'lies' if slits == 1 else 'lie'} inside a facet: a "
+            f"flat line (F) goes on from {them} to the next line.",
+        )
+    if hanging:
+        hangs, them = ("hangs", "it") if hanging == 1 else ("hang", "each")
+        yield Finding(
+            "loose-parts",
+            f"{_many(hanging, 'part')} of the drawing {hangs} in a facet at one vertex: a flat "
+            f"line (F) joins {them} to the lines around.",
+        )
 
 
 def told_of_rulings(count: int) -> Finding:

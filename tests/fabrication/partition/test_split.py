@@ -22,6 +22,8 @@ from miurafab.fabrication.partition.region_growing import is_disk
 from miurafab.fabrication.partition.split import check_facets, split
 from miurafab.fabrication.tab_choice import choose_tabs
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.formats.crease_lines import CreaseLines
+from miurafab.origami.formats.planar_graph import pattern_from_lines
 
 CASES = {
     "miura": miura(24, 20),
@@ -171,6 +173,33 @@ def test_a_ring_that_fits_stays_whole_and_its_hole_is_cut_out():
     assert len(facets.interiors) == 1
     assert outer.contains(hole)
     assert shapely.hausdorff_distance(rest, facets) < 0.01
+
+
+@pytest.mark.parametrize(
+    "windows",
+    [
+        [(50, 0, 70, 50, 30, 50)],
+        [(50, 100, 70, 130, 30, 130), (50, 100, 70, 60, 30, 60)],
+        [(0, 0, 30, 10, 10, 30), (30, 10, 50, 40, 60, 10), (60, 10, 80, 30, 90, 10)],
+    ],
+)
+def test_windows_that_touch_the_border_or_each_other_in_a_vertex_leave_one_patch(windows):
+    """It had a seam and a tab. No loop has a vertex twice: a window at the border is no notch."""
+    outer = (0, 0, 200, 0, 200, 200, 0, 200)
+    loops = [np.array(loop, dtype=np.float64).reshape(-1, 2) for loop in (outer, *windows)]
+    ends = [np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in loops]
+    lines = np.concatenate([*ends, [[[100.0, 0.0], [100.0, 200.0]]]])
+    letters = np.array(["B"] * (len(lines) - 1) + ["V"])
+    pattern = pattern_from_lines(CreaseLines(lines, letters, np.full(len(lines), np.nan)))
+    outlined = outline_patches(pattern, 300.0, 300.0, card(kerf=0.4))
+    (patch,) = outlined.patches
+    assert len(outlined.tabs) == 0
+    outline = shapely.Polygon(patch.rings[0], patch.rings[1:])
+    assert outline.is_valid
+    assert outline.equals(
+        shapely.Polygon(loops[0]) - shapely.union_all(shapely.polygons(loops[1:]))
+    )
+    assert len(patch.cut_lines) == len(loops)
 
 
 def test_two_separate_pieces_of_paper_are_two_patches():
