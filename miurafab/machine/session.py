@@ -290,7 +290,6 @@ class Session:
             self._check = check
         if not self.wait_status().beam_off:
             self.command("M5")
-            self.wait_status()
 
     def _require_ready(self, text: str) -> None:
         if self.connection.may_send(SendLine(0, text.encode("ascii"))):

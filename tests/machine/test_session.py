@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -117,6 +118,38 @@ def test_what_a_person_typed_is_set_right_before_the_next_job() -> None:
     assert {"G20", "G91", "G55", "M8"} <= set(here.state.modes)
     here.cut(JOB)
     assert max(s.x1 for s in wire.device.beam_log) == pytest.approx(15, abs=0.1)
+
+
+class Restarting(Wire):
+    """From the first ``ok`` behind ``$RST=#`` on it is ``mute``, or its banner alone is lost; the
+    report before that is.
+    """
+
+    mute = over = False
+
+    def read(self, timeout: float) -> bytes:
+        said = super().read(timeout)
+        if b"$RST=#" not in self.sent:
+            return said
+        if self.over:
+            return b"" if self.mute or b"Grbl" in said else said
+        self.over = said == b"ok\r\n"
+        return b"" if b"<" in said else said
+
+
+@pytest.mark.parametrize("mute", [False, True])
+def test_a_restart_behind_a_line_is_known_without_its_banner_and_a_missing_one_told(
+    mute: bool,
+) -> None:
+    wire = Restarting(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
+    here = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    here.open()
+    wire.mute = mute
+    says = r"did not start again after '\$RST=#'\.$"
+    here.conversation.ask_status()
+    with pytest.raises(ControllerError, match=says) if mute else nullcontext():
+        here.conversation.command("$RST=#")
+    assert wire.over
 
 
 def test_a_refused_line_or_jog_costs_no_origin() -> None:
