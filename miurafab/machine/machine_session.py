@@ -148,7 +148,7 @@ class MachineSession:
                 return self.state
 
     def _note(self, report: StatusReport | None) -> None:
-        self._at_risk = report is not None and (report.beam_on or report.state not in _RESTING)
+        self._at_risk = report is None or report.beam_on or report.state not in _RESTING
 
     # The keys
 

@@ -14,6 +14,7 @@ Lines that are no program light it too (``system.c``, ``stepper.c``):
 * ``$RST=`` ends in a reset, and so does the ``$C`` that ends the check mode. ``$RST=$`` and
   ``$RST=*`` bring back the firmware's own ``$32``, which is 0 in GRBL; ``*`` clears the blocks.
 * With ``$31`` not below ``$30`` each S is full power, S0 too, and an armed beam is on in any mode.
+  The setting of either puts the beam out (``settings.c``), until the blocks of the next reset.
 * A jog moves with the beam that is armed, and leaves it on behind it, unless that is ``M4`` in
   laser mode.
 
@@ -36,7 +37,7 @@ from miurafab.gcode.words import split_words
 from miurafab.machine.known_controller import KnownController
 from miurafab.units import DECIMAL
 
-_LASER_MODE = 32
+_MOST, _LEAST, _LASER_MODE = 30, 31, 32
 _BURNING = (1.0, 2.0, 3.0)
 _NUMBER = rf"([-+]?{DECIMAL})"
 _STARTUP = re.compile(rf"\$N{_NUMBER}=(.*)")
@@ -118,13 +119,9 @@ class RestingBeam:
         if state.modes:
             self._since.clear()  # else the controller does not tell them while it moves
         values = known.settings.values
-        laser_mode, least, most = bool(values.get(_LASER_MODE)), values.get(31, 0.0), values.get(30)
-        only = None if most is None or least < most else max(most, 1.0)
         before = [word for mode in (*known.modes.modes, *self._since) for word in _words(mode)]
-        lights = partial(resting_power, only=only)
-        burns = 0.0 if state.beam_off else lights(before, laser_mode=laser_mode)
-        checks = state.state == "Check"
-        lit = _lit(read, before, known.modes.startup, laser_mode, checks=checks, lights=lights)
+        burns = 0.0 if state.beam_off else _power(before, values)
+        lit = _lit(read, before, known.modes.startup, values, checks=state.state == "Check")
         if lit.now <= burns and lit.later == 0.0:
             return
         self._held = line
@@ -141,17 +138,15 @@ def _lit(
     read: str,
     before: Words,
     startup: Mapping[int, str],
-    laser_mode: bool,
+    values: Mapping[int, float],
     *,
     checks: bool,
-    lights: Callable[..., float],
 ) -> _Lit:
-    """What is lit by a line, behind the words ``before`` and with the blocks ``startup``;
-    ``checks``: the controller is in check mode. ``lights`` is :func:`resting_power` there.
+    """What is lit by a line, behind the words ``before`` and with the blocks ``startup`` and the
+    settings ``values``; ``checks``: the controller is in check mode.
     """
-
-    def power(words: Iterable[tuple[str, float]], laser_mode: bool = laser_mode) -> float:
-        return lights(words, laser_mode=laser_mode)
+    laser_mode = bool(values.get(_LASER_MODE))
+    power = partial(_power, values=values)
 
     def start(blocks: Mapping[int, str]) -> Words:
         return [word for number in sorted(blocks) for word in _words(blocks[number])]
@@ -160,18 +155,28 @@ def _lit(
     if block is not None:
         blocks = {**startup, whole_byte(read_single(block[1])): block[2]}
         return _Lit(power([*before, *_words(block[2])]), power(start(blocks)), laser_mode)
-    if setting is not None and whole_byte(read_single(setting[1])) == _LASER_MODE:
-        after = whole_byte(read_single(setting[2])) != 0
-        return _Lit(0.0, power(start(startup), after) if after != laser_mode else 0.0, after)
+    if setting is not None:
+        number, value = whole_byte(read_single(setting[1])), read_single(setting[2])
+        after = {**values, number: value if number != _LASER_MODE else whole_byte(value) != 0}
+        was, later = (_power(start(startup), each) for each in (values, after))
+        return _Lit(0.0, later if later > was else 0.0, bool(after.get(_LASER_MODE)))
     if read.startswith("$RST=") or (read == "$C" and checks):
-        after = laser_mode and read not in ("$RST=$", "$RST=*")
-        at_start = power(start({} if read == "$RST=*" else startup), after)
-        return _Lit(at_start, at_start, after)
+        stays = laser_mode and read not in ("$RST=$", "$RST=*")
+        at_start = start({} if read == "$RST=*" else startup)
+        lit = _power(at_start, {**values, _LASER_MODE: stays})
+        return _Lit(lit, lit, stays)
     if read == "$H":
         return _Lit(power([*before, *start(startup)]), 0.0, laser_mode)
     if read.startswith("$J="):
         return _Lit(power([*before, *_words(_JOG)]), 0.0, laser_mode)
     return _Lit(0.0 if read.startswith("$") else power([*before, *_words(read)]), 0.0, laser_mode)
+
+
+def _power(words: Iterable[tuple[str, float]], values: Mapping[int, float]) -> float:
+    """:func:`resting_power` with the settings ``values``."""
+    least, most = values.get(_LEAST, 0.0), values.get(_MOST)
+    only = None if most is None or least < most else max(most, 1.0)
+    return resting_power(words, laser_mode=bool(values.get(_LASER_MODE)), only=only)
 
 
 def _words(text: str) -> Words:

@@ -311,6 +311,37 @@ def test_what_arms_is_held_back_where_each_s_is_full_power(range_: str, line: st
     assert not wire.device.beam_on
 
 
+@pytest.mark.parametrize("range_", ["$31=1000", "$30=0", "$3/1.2=1000", "$30=0.5"])
+def test_what_makes_each_s_full_power_is_held_back_where_a_startup_block_would_burn(
+    range_: str,
+) -> None:
+    """A setting of either puts the beam out at first (gnea/grbl 1.1, ``settings.c``)."""
+    session, wire = here(laser_mode=True)
+    assert all(
+        is_sent(session, wire, line) for line in ("$N0=M4", "$31=1", "$30=500", "$32=1", "$130=0")
+    )
+    with pytest.raises(GcodeError, match=r"and the next reset .*\(\$32=1\).* again after each"):
+        session.say(range_)
+    assert is_sent(session, wire, range_)
+    assert not wire.device.beam_on
+    wire.device.power_cycle()
+    wire.device.advance(1.0)
+    assert wire.device.beam_on
+
+
+def test_what_leaves_each_s_full_power_is_sent() -> None:
+    session, wire = here(laser_mode=True)
+    assert all(is_sent(session, wire, line) for line in ("$31=1000", "$N1=M5S0", "$31=2000"))
+    session, wire = here(laser_mode=True, _31=1000)
+    assert not is_sent(session, wire, "$N0=M4")
+    assert is_sent(session, wire, "$N0=M4")
+    assert is_sent(session, wire, "$31=2000")
+    assert is_sent(session, wire, "$31=0")
+    wire.device.power_cycle()
+    wire.device.advance(1.0)
+    assert not wire.device.beam_on
+
+
 @pytest.mark.parametrize(
     ("laser_mode", "armed", "lights"),
     [(True, "M3S500", True), (True, "M4S500", False), (False, "", False), (True, "M5S500", False)],
@@ -465,6 +496,16 @@ def test_a_locked_controller_runs_no_startup_block_and_is_known_dark() -> None:
     again = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
     assert again.open().state == "Alarm"
     assert again.abort()
+
+
+def test_a_machine_of_which_nothing_was_told_is_reset_behind_a_key(tmp_path: Path) -> None:
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE))
+    session.realtime(b"~")
+    with pytest.raises(MiurafabError, match="journal"):
+        session.cut(plan_job(Job("a.nc", "G0 X9\n"), MACHINE), journal_path=tmp_path)
+    session.close()
+    assert b"\x18" in wire.commands
 
 
 def test_a_move_goes_on_after_no_job_that_could_not_begin(tmp_path: Path) -> None:
