@@ -296,12 +296,12 @@ class MachineSession:
 
     def load(self) -> MachineState:
         """Somebody has changed the material or turned it over; a lid opened for that is shut."""
-        self.known.loaded = None
         self._resting_beam.forget()
-        if self.state.state != "Door:0":
-            return self.state
-        self.realtime(RESUME)  # nothing runs: the controller leaves the state Door
-        return self.look()
+        if shut := self.state.state == "Door:0":
+            self.conversation.require_nothing_waits()
+            self.realtime(RESUME)  # the controller leaves the state Door
+        self.known.loaded = None
+        return self.look() if shut else self.state
 
     def abort(self, *, at_once: bool = False) -> bool:
         """Stop whatever runs by a reset, after a dark motion has come to rest, unless ``at_once``;

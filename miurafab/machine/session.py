@@ -50,7 +50,8 @@ class Session:
     ``patience`` is the longest time between two calls of ``check``, in seconds.
     ``starts`` grows with each reset that was sent or greeted; ``restarted_itself`` is set at one
     that nobody sent, until the position is known again. ``overrides`` are as written until
-    they are told. ``runs_at_start``: it has startup blocks, which run after each reset.
+    they are told. ``runs_at_start``: it has startup blocks, which run after each reset. ``ran``: it
+    ran a program, by the last report that told of no hold and no open lid.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class Session:
         self.mm_per_unit = 1.0
         self.starts = 0
         self.restarted_itself = False
-        self.runs_at_start = False
+        self.runs_at_start = self.ran = False
         self._resetting = False
         self.on_data: Callable[[bytes], None] = lambda data: None
         self.patience = math.inf
@@ -146,9 +147,11 @@ class Session:
                 if event.overrides is not None and len(event.overrides) == 3:
                     self.overrides = Overrides(*event.overrides)
                     self.overrides_told = True
+                if event.state not in ("Hold", "Door"):
+                    self.ran = event.state == "Run"
                 self._asked_at = None
             elif isinstance(event, Banner):
-                self.banner = event
+                self.banner, self.ran = event, False
                 self.starts += 1
                 self.restarted_itself = self.restarted_itself or not self._resetting
                 self._resetting = False
@@ -303,6 +306,16 @@ class Session:
             f"The controller is not ready for '{text}' (it is {self.connection.state.name.lower()}"
             "); reset it first."
         )
+
+    def require_nothing_waits(self) -> None:
+        """Raise :class:`~miurafab.errors.ControllerError` where a resume would go on with a
+        program.
+        """
+        if self.ran:
+            raise ControllerError(
+                "A program was running when the lid was opened, and would go on; resume it or stop "
+                "it first."
+            )
 
     # Beginning and end
 

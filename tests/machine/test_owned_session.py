@@ -597,6 +597,22 @@ def test_a_lid_that_is_shut_again_is_the_only_one_that_new_material_resumes() ->
     assert session.state.state == "Idle"
 
 
+def test_new_material_goes_on_with_no_program_that_the_lid_interrupted() -> None:
+    session, wire = here()
+    session.say("M4S500")
+    session.say("G1X5F1000")
+    wire.device.receive(b"\x84")
+    assert session.watch(0.5).state == "Door:0"
+    wire.device.beam_log.clear()
+    with pytest.raises(ControllerError, match="running when the lid was opened, and would go on"):
+        session.load()
+    session.watch(0.5)
+    assert wire.device.beam_log == []
+    session.abort()
+    assert sent_by(wire, session.load) == b""
+    assert session.state.state == "Idle"
+
+
 def test_settling_waits_for_a_jog() -> None:
     session, wire = jogging()
     assert session.settle().state == "Idle"
