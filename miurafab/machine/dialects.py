@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from miurafab.grbl.connection import Connection
 from miurafab.machine.grbl_driver import NOT_CONFIRMED, WAS_RESET, GrblDriver
+from miurafab.machine.known_controller import runs_unseen
 from miurafab.machine.marlin_driver import NOT_CONFIRMED as NOT_HALTED
 from miurafab.machine.marlin_driver import WAS_HALTED, MarlinDriver, MarlinWire
 from miurafab.machine.plotter_driver import NOT_TOLD, PEN_SENT_UP, PlotterDriver, send_up
@@ -66,4 +67,6 @@ def make_safe(machine: MachineProfile, transport: FlowTransport) -> str:
     if machine.dialect == "hpgl":
         told = send_up(transport, b";PU;" + DROP_ALL + PEN_UP)
         return PEN_SENT_UP if told else NOT_TOLD
-    return WAS_RESET if Session(transport, Connection()).stop() else NOT_CONFIRMED
+    session = Session(transport, Connection())
+    session.runs_at_start = runs_unseen(machine.dialect)
+    return WAS_RESET if session.stop() else NOT_CONFIRMED

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 from miurafab.errors import InputError
 from miurafab.findings import Finding
+from miurafab.gcode.dialect_words import FLUIDNC
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.events import Event, Modes, Options, Parameter, StartupBlock, Version
 from miurafab.grbl.lines import writes_setting
@@ -124,6 +125,7 @@ class KnownController:
         self.greeted = False
         self._session = session
         self._dialect = dialect
+        session.runs_at_start = runs_unseen(dialect)
         self._offsets: Mapping[str, tuple[float, ...]] = {}
         self._unknown = set(_QUESTIONS)
         self._opened = self._set = self._told = self._astray = False
@@ -215,7 +217,7 @@ class KnownController:
         else:
             blocks = {each.number: each.text for each in said if isinstance(each, StartupBlock)}
             self.modes = ControllerModes(self.modes.modes, blocks)
-            self._session.runs_at_start = any(blocks.values())
+            self._session.runs_at_start = runs_unseen(self._dialect) or any(blocks.values())
 
     # What may have changed
 
@@ -233,6 +235,15 @@ class KnownController:
         self._unknown |= {OFFSETS, MODES}
         if writes_setting(text.encode("ascii")):
             self._unknown |= {SETTINGS, STARTUP, BUILD}
+
+    def unlock(self) -> None:
+        """Unlock it, and wait for the end of what it may run behind that, which may change modes
+        and offsets, and arm the beam.
+        """
+        self._session.command("$X")
+        if runs_unseen(self._dialect):
+            self.may_differ()
+            self.refresh()
 
     def home(self, heed: Callable[[], None] = lambda: None) -> None:
         """See :meth:`Session.home`. The startup blocks that run behind it may change modes and
@@ -321,6 +332,13 @@ class KnownController:
             loaded=self.loaded,
             settings=self.settings,
         )
+
+
+def runs_unseen(dialect: str) -> bool:
+    """Whether a controller of ``dialect`` may run what ``$N`` does not tell: FluidNC has macros
+    ``after_reset`` and ``after_unlock``, which run before any further line (``Protocol.cpp``).
+    """
+    return dialect == FLUIDNC
 
 
 def require_talk(dialect: str) -> None:

@@ -50,8 +50,8 @@ class Session:
     ``patience`` is the longest time between two calls of ``check``, in seconds.
     ``starts`` grows with each reset that was sent or greeted; ``restarted_itself`` is set at one
     that nobody sent, until the position is known again. ``overrides`` are as written until
-    they are told. ``runs_at_start``: it has startup blocks, which run after each reset. ``ran``: it
-    ran a program, by the last report that told of no hold and no open lid.
+    they are told. ``runs_at_start``: it may run something after each reset, as startup blocks.
+    ``ran``: it ran a program, by the last report that told of no hold and no open lid.
     """
 
     def __init__(

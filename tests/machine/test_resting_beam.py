@@ -10,11 +10,14 @@ from wires import FakeWire
 
 from miurafab.errors import GcodeError, MiurafabError
 from miurafab.gcode.job import Job
+from miurafab.machine.dialects import make_safe
+from miurafab.machine.grbl_driver import WAS_RESET
 from miurafab.machine.known_controller import PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.planning import SendOptions, plan_job
 from miurafab.machine.resting_beam import resting_power
 from miurafab.machine.signals import StopSignals
+from miurafab.profiles import load_machine
 from miurafab.simulate.beam import standing_seconds
 from miurafab.simulate.grbl.controller import VirtualGrbl, virtual_settings
 
@@ -517,3 +520,50 @@ def test_a_move_goes_on_after_no_job_that_could_not_begin(tmp_path: Path) -> Non
     at = wire.device.position
     wire.device.advance(5.0)
     assert wire.device.position == at
+
+
+class Macros(FakeWire):
+    """FluidNC that runs a macro of two lines behind each reset and each ``$X``."""
+
+    unlocks, unanswered = False, 0
+
+    def write(self, data: bytes) -> None:
+        self.unlocks = self.unlocks or data == b"$X\n"
+        super().write(data)
+
+    def read(self, timeout: float) -> bytes:
+        said = super().read(timeout)
+        if self.unanswered and b"ok\r\n" in said:  # a macro is not answered
+            self.unanswered -= 1
+            said = said.replace(b"ok\r\n", b"", 1)
+        elif b"Grbl" in said or (self.unlocks and b"ok" in said):
+            self.device.receive(b"G4P0.3\nG1F100M3S500\n")
+            self.unlocks, self.unanswered = False, 2
+        return said
+
+
+def with_macros() -> Macros:
+    machine = load_machine("fluidnc-laser-600")
+    return Macros(VirtualGrbl(virtual_settings(machine), baud=115_200, dialect="fluidnc"))
+
+
+def test_what_a_macro_of_fluidnc_lights_behind_an_unlocking_is_put_out_at_the_close() -> None:
+    wire = with_macros()
+    session = MachineSession(wire, StopSignals(), PortSetup("fluidnc"))
+    assert session.unlock().beam_on
+    assert session.close()
+    wire.device.advance(5.0)
+    assert not wire.device.beam_on
+
+
+def test_what_a_macro_of_fluidnc_lights_behind_a_reset_is_put_out() -> None:
+    wire = with_macros()
+    session = MachineSession(wire, StopSignals(), PortSetup("fluidnc"))
+    session.open()
+    assert session.abort()
+    wire.device.advance(5.0)
+    assert not wire.device.beam_on
+    wire.device.receive(b"M3S500G1F100\n")
+    assert make_safe(load_machine("fluidnc-laser-600"), wire) == WAS_RESET
+    wire.device.advance(5.0)
+    assert not wire.device.beam_on
