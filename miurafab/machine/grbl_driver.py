@@ -74,6 +74,8 @@ class GrblDriver(StreamDriver):
         self._doubtful_reports = 0  # that may tell whether a resume was heard
         self._listened = 0.0  # seconds; what shows the progress may take longer than a patience
         self._heard_at = 0.0  # of these, when it last answered or was busy
+        self._answered_at = 0.0
+        self._stopped_with_an_answer = False
         self._stopped_at: float | None = None  # ... and when it stopped in mid-job
         self._lit_holds = 0  # reports in a row of a hold with the beam on
 
@@ -227,6 +229,7 @@ class GrblDriver(StreamDriver):
             return
         if self._stopped_at is None:
             self._stopped_at = self._listened
+            self._stopped_with_an_answer = self._listened - self._answered_at < 2 * _POLL_S
         stopped, name = self._listened - self._stopped_at, self.plan.job.name
         late = self._late_pause() if _rests(report) and stopped > ANSWER_S else None
         if late is not None:
@@ -252,13 +255,14 @@ class GrblDriver(StreamDriver):
 
     def _late_pause(self) -> int | None:
         """The line behind the first that is owed at whose pause the head stands, if there is one;
-        GRBL has answered all lines before it, then. A hold in a dwell stands there, too.
+        GRBL has answered all lines before it, then. A hold in a dwell stands there, too, but that
+        does not begin with an answer, as the pause behind a dwell does.
         """
         program = self.plan.program
         if program is None:
             return None
         for before, line in pairwise(self._session.connection.in_flight):
-            if dwell_seconds(before.data):
+            if dwell_seconds(before.data) and not self._stopped_with_an_answer:
                 return None
             if self._is_at_pause(program, line.number):
                 return line.number
@@ -330,7 +334,10 @@ class GrblDriver(StreamDriver):
         owed = self._session.connection.in_flight
         reports = [event for event in events if isinstance(event, StatusReport)]
         busy = any(report.state not in _DONE for report in reports)
-        if busy or any(isinstance(event, Ok | Error) for event in events):
+        answers = any(isinstance(event, Ok | Error) for event in events)
+        if answers:
+            self._answered_at = self._listened
+        if busy or answers:
             self._heard_at = self._listened
         patience = ANSWER_S + self._streamer.dwell_in_flight
         if owed and reports and self._listened - self._heard_at > patience:

@@ -649,6 +649,15 @@ def test_a_lost_answer_of_a_pause_ends_the_job_at_the_next() -> None:
         deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
 
 
+def test_an_answer_that_is_lost_before_a_dwell_and_a_pause_ends_the_job() -> None:
+    job = Job("paused.nc", "M4 S0\nG1 X20 S500 F3000\nG0 X25\nM8\nG4 P2\nM0\nG1 X30\nM5\n")
+    says = r"waits at line 6 of paused\.nc \(M0\) but has not answered line 5 before it for 3 s"
+    with pytest.raises(ControllerError, match=says):
+        deliver(
+            replace(plan_job(job, MACHINE), at_pause="go on"), losing(b"G1X20", 1), StopSignals()
+        )
+
+
 def test_a_hold_in_a_dwell_before_a_pause_is_no_loss() -> None:
     job = Job("paused.nc", "M4 S0\nG1 X20 S500 F3000\nG4 P4\nM0\nG1 X30\nM5\n")
     wire = new_wire()
