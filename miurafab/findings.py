@@ -164,7 +164,7 @@ RULES = {
     "program": _check(
         "a line that the controller would answer with an error, or whose effect cannot be told"
     ),
-    "m3": _check("`M3`, or `M4` without laser mode: the beam stays on wherever motion stops"),
+    "m3": _check("`M3`, or `M4` without laser mode (Marlin: `I`): the beam stays on at rest"),
     "bounds": _check("a move off the bed"),
     "islands": _check("a stroke inside an outline that is cut through already"),
     "outlines": _check("an outline whose end misses its beginning by a little"),
@@ -172,7 +172,7 @@ RULES = {
     "power": _check("an S word above the machine's full power"),
     "material": _check("an S word above the `max_power` of the material"),
     "other-beam": _check("a job made for another kind of beam, or for another full power"),
-    "laser-mode": _check("laser mode (`$32`) that does not suit the tool"),
+    "laser-mode": _check("laser mode (`$32`; Marlin: `M4 I`) that does not suit the tool"),
     "rate": Rule("warning", "a feed above the machine's largest rate"),
     "loose": Rule("warning", "a stroke inside a closed stroke that may have cut its piece loose"),
     "armed": Rule("warning", "a job that ends with the laser armed"),

@@ -20,7 +20,7 @@ import numpy as np
 from miurafab.errors import GcodeError
 from miurafab.findings import Finding
 from miurafab.gcode.job import Job
-from miurafab.gcode.program import BEAM_M3, BEAM_M4, PAUSE, Program
+from miurafab.gcode.program import BEAM_M3, BEAM_M4, BEAM_OFF, PAUSE, RAPID, Program
 from miurafab.gcode.reading import has_laser_mode, read_program
 from miurafab.geometry.arrays import Bools
 from miurafab.machine.judge_words import (
@@ -30,6 +30,7 @@ from miurafab.machine.judge_words import (
     constant_beam,
     dwells_under_m3,
     leaves_air_on,
+    line_of_plain_beam,
     outputs,
     relative_moves,
 )
@@ -96,6 +97,7 @@ def judge_program(
     yield from _power("power", program, full, f"{full} that is full power on {machine.name}")
     if laser:
         yield from _no_laser_mode(machine)
+        yield from _burnt_travels(job, program, machine)
         yield from armed_at_the_end(job)
     if leaves_air_on(job):
         yield Finding("air", f"{job.name} ends with the air on; M9 is sent after it.", job.name)
@@ -268,6 +270,16 @@ def _rates(program: Program, machine: MachineProfile) -> Iterator[Finding]:
         feed = program.feed_mm_min[np.argmax(too_fast)]
         says = f"asks for F{feed:g}, above the largest rate of {machine.name}, which will hold."
         yield _in_moves("rate", program, too_fast, says)
+
+
+def _burnt_travels(job: Job, program: Program, machine: MachineProfile) -> Iterator[Finding]:
+    plain = line_of_plain_beam(job) if machine.dialect == "marlin" else None
+    if plain is None:
+        return
+    burnt = (program.motion == RAPID) & (program.spindle != BEAM_OFF) & (program.line > plain)
+    if burnt.any():
+        says = "travels with the beam on: to Marlin it is on in G0 after M3 or M4 without I."
+        yield _in_moves("laser-mode", program, burnt, says)
 
 
 # A rule about the profile

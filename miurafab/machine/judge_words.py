@@ -59,6 +59,7 @@ class _Words:
 
 _M3 = _Words("M", 3, decimals=True)
 _M4 = _Words("M", 4, decimals=True)
+_ARMS = _Words("M", 3, 4, decimals=True)
 _SPINDLE = _Words("M", 2, 3, 4, 5, 30, decimals=True)
 _PAUSE = _Words("M", 0, 1)
 _DWELL = _Words("G", 4)
@@ -98,6 +99,31 @@ def constant_beam(job: Job, machine: MachineProfile) -> Iterator[Finding]:
             "standing still, if the link to the machine is lost; allow M3 explicitly and stay "
             "beside the machine.",
         )
+    elif machine.dialect == "marlin" and _first_line(job, _M3) is None:
+        line = line_of_plain_beam(job)
+        if line is not None:
+            yield at_line(
+                "m3",
+                job.name,
+                line,
+                "arms the laser with M4 without I, which is as M3 to Marlin: it puts the beam on "
+                "at once, standing still; write M4 I, or allow M3 explicitly and stay beside the "
+                "machine.",
+            )
+
+
+def line_of_plain_beam(job: Job) -> int | None:
+    """The first line that arms the laser of a Marlin without its inline mode (``M4 I``), if there
+    is one: the beam is on from there to ``M5``, whatever moves.
+    """
+    for match in _ARMS.anywhere.finditer(job.text):
+        if _is_plain(_code(_line_at(job.text, match.start()))):
+            return _number_at(job.text, match.start())
+    return None
+
+
+def _is_plain(code: str) -> bool:
+    return bool(_ARMS.among(code)) and "I" not in code
 
 
 def armed_at_the_end(job: Job) -> Iterator[Finding]:
@@ -217,10 +243,10 @@ def _code(line: str) -> str:
 
 
 def dwells_under_m3(job: Job) -> list[tuple[int, float]]:
-    """The dwells and pauses while M3 and a power are in force, by the words alone: Marlin without
-    inline mode (``M3`` without ``I``) burns with them at once, whatever the motion mode is.
+    """The dwells and pauses while M3, or M4 without ``I``, and a power are in force, by the words
+    alone: Marlin without inline mode burns with them at once, whatever the motion mode is.
     """
-    if _first_line(job, _M3) is None:
+    if _first_line(job, _M3) is None and line_of_plain_beam(job) is None:
         return []
     armed, power = False, 0.0
     burning = []
@@ -228,7 +254,7 @@ def dwells_under_m3(job: Job) -> list[tuple[int, float]]:
         code = _code(line)
         spindle, strength = _SPINDLE.among(code), _POWER.search(code)
         dwells = _DWELL.begin(code) or _PAUSE.begin(code)
-        armed = spindle[-1] == 3 if spindle else armed
+        armed = spindle[-1] == 3 or _is_plain(code) if spindle else armed
         power = power if strength is None or dwells else float(strength[1])
         if armed and power > 0 and dwells and not _NO_DWELL.match(code):
             burning.append((number, power))

@@ -28,7 +28,14 @@ from miurafab.findings import Finding
 from miurafab.gcode.job import SendLine
 from miurafab.machine.greeting import ANSWER_S
 from miurafab.machine.judge_job import longest_line
-from miurafab.machine.judge_words import air_after, leaves_air_on, waits_for_person
+from miurafab.machine.judge_words import (
+    air_after,
+    leaves_air_on,
+    line_of_plain_beam,
+    waits_for_person,
+)
+from miurafab.machine.keys import HOLD
+from miurafab.machine.progress import JobAborted
 from miurafab.machine.session import HOMING_S
 from miurafab.machine.stream_driver import JobContext, StreamDriver, nobody_there, waiting_at
 from miurafab.machine.transcript import Transcript
@@ -41,8 +48,11 @@ WAS_HALTED = "the controller was halted (M112) with the laser off; reset it befo
 NOT_CONFIRMED = (
     "the controller did not confirm that it halted, so switch the laser off at the machine"
 )
-SET = (b"G21", b"G90")
-"""mm and absolute moves, as after power-up: a board that was not reset keeps its last modes."""
+DARK = (b"M5I", b"M5")
+"""What ends a beam of before, by its panel or another program, and its inline mode."""
+SET = (b"G21", b"G90", b"M220S100")
+"""mm, absolute moves and feeds as written, as after power-up: a board that was not reset keeps its
+last modes, and what the knob of its panel made of the feed."""
 AIR_IS_ON = ", and the air stays on: shut it at the machine"
 _LOOK_S = 0.05  # between two reads of the keys
 _SILENCES = 3  # the line is sent again after each silence but the last
@@ -92,6 +102,19 @@ class MarlinDriver(StreamDriver):
         for code in (b"M400", b"M5", *air):
             wire.send(SendLine(0, code), self.attend_and_tell, self._where)
 
+    def obey(self) -> None:
+        """See :class:`~miurafab.machine.stream_driver.StreamDriver`. A job whose beam would stay
+        on is stopped in place of a hold.
+        """
+        laser = self.plan.machine.tool.kind == "laser"
+        if laser and HOLD in self.orders and line_of_plain_beam(self.plan.job) is not None:
+            raise JobAborted(
+                f"{self.plan.job.name} was stopped at the keyboard, not held: after M3 or M4 "
+                "without I the controller leaves the beam on at rest.",
+                at_once=True,
+            )
+        super().obey()
+
     def _rest_while_held(self) -> None:
         while self.held:
             self.attend_and_tell()
@@ -126,6 +149,8 @@ class MarlinDriver(StreamDriver):
         wire.greet(0.0 if known.greeted else plan.wait)
         known.greeted = True
         said = wire.send(SendLine(0, b"M115"))
+        for code in DARK if plan.machine.tool.kind == "laser" else ():
+            wire.send(SendLine(0, code))
         if plan.options.home:
             self.at_risk = True
             wire.send(SendLine(0, b"G28XY"), patience=HOMING_S)

@@ -335,3 +335,24 @@ def test_a_coordinate_is_told_apart_from_a_limit() -> None:
         1e3: "1000",
     }
     assert {value: coordinate(value) for value in shown} == shown
+
+
+@pytest.mark.parametrize(
+    ("arms", "codes"),
+    [
+        ("M4 I S0", []),
+        ("M4 S0 I", []),
+        ("M4 S9", ["m3", "laser-mode"]),
+        ("M4 I\nm 04", ["m3", "laser-mode"]),
+        ("M3 S9", ["m3", "laser-mode"]),
+        ("M3 I S9", ["m3"]),
+    ],
+)
+def test_without_its_inline_mode_marlin_burns_along_travels(arms: str, codes: list[str]) -> None:
+    text = f"M5\nG0 X1 F3000\n{arms}\nG1 X2 S9 F600\nG0 X4 S0 F3000\nG1 X5 S9 F600\nM5 I\nM5\n"
+    found = judge_job(Job("a.nc", text), MARLIN).findings
+    assert [each.code for each in found] == codes
+    assert not any(each.code == "m3" for each in judge_job(Job("a.nc", "M4 S9\n"), HAL).findings)
+    each_off = text.replace("G0 X4", "M5\nG0 X4").replace("G1 X5", f"{arms}\nG1 X5")
+    found = judge_job(Job("a.nc", each_off), MARLIN).findings
+    assert [each.code for each in found] == codes[:1]

@@ -198,7 +198,8 @@ def test_the_first_mist_is_found(text: str, line: int | None) -> None:
         ("M3 S5\nG4 P1\n", [(2, 5.0)]),
         ("S5\n(a)\nM3\nG4 P1\n", [(4, 5.0)]),
         ("M3 S5\nM5\nG4 P1\n", []),
-        ("M3 S5\nM4\nG4 P1\nM30\nG4 P1\n", []),
+        ("M3 S5\nM4 I\nG4 P1\nM30\nG4 P1\n", []),
+        ("M4 I S5\nG4 P1\nm 04 s5\nG4 P1\n", [(4, 5.0)]),
         ("M3 S0\nG4 P1\nS0.5\nG4 P1\n", [(4, 0.5)]),
         ("M3 S5\nG4 S2\nG04 P1\n", [(2, 5.0), (3, 5.0)]),  # the S of a dwell are seconds
         ("M3 S5\nG4 P0\nG4 S0.0\nG4 P-00.\nG4 P0.1\n", [(5, 5.0)]),

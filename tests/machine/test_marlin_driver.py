@@ -135,6 +135,38 @@ def test_a_job_is_burnt_whole_and_ends_dark(tmp_path: Path) -> None:
     assert_dark(device)
 
 
+@pytest.mark.parametrize("home", [False, True])
+def test_a_beam_and_a_feed_that_were_left_are_ended_before_anything_moves(home: bool) -> None:
+    device = new_device()
+    device.receive(b"M220 S50\nM3 S200\n")
+    device.advance(0.5)
+    device.take_output()
+    assert device.beam_on
+    job = Job("left.nc", "G21\nG90\nG1 X30 S0 F600\nM4 I S0\nG1 X40 S100 F600\nM5 I\nM5\n")
+    deliver(plan_job(job, MACHINE, SendOptions(home=home)), Wire(device), StopSignals())
+    left, stroke = device.beam_log
+    assert (left.standing, left.x0) == (True, 0.0)
+    assert (round(stroke.x0), round(stroke.x1)) == (30, 40)
+    assert stroke.t1 - stroke.t0 == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_job_whose_beam_stays_on_at_rest_is_stopped_in_place_of_a_hold() -> None:
+    strokes = "".join(f"G1 X{9 + 3 * (n % 2)} Y{n} S99 F600\n" for n in range(99))
+    for arms, dark in (("M3 S99", False), ("M3 I S99", True)):
+        device = new_device()
+        keys = Pressed(device, **{" ": 8.0, "r": 20.0})
+        plan = plan_job(
+            Job("plain.nc", f"{arms}\n{strokes}M5 I\nM5\n"), MACHINE, SendOptions(allow_m3=True)
+        )
+        if dark:
+            deliver(plan, Wire(device), StopSignals(), keys=keys)
+        else:
+            with pytest.raises(JobStopped, match="not held: after M3 or M4 without I the contr"):
+                deliver(plan, Wire(device), StopSignals(), keys=keys)
+            assert device.now < 9.0
+        assert not device.beam_on
+
+
 PAUSED = "M4 I S0\nG1 X9 S200 F3000\nM5 I\n{pause}\nM4 I S0\nG1 X12 S200\nM5 I\nM5\n"
 
 

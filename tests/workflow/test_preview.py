@@ -115,7 +115,7 @@ def test_marlin_without_inline_mode_burns_in_a_dwell_under_m3():
     assert "dwell" in codes(text, marlin)
     assert "line 2 (the first of 2) waits with the beam on at S100" in run(text, marlin).warnings[1]
     assert "dwell" in codes("M3 S100\nG4.0 P500\nM5\n", marlin)
-    for dark in (text.replace("M3", "M4"), text.replace("S100", "S0"), text.replace("M3", "M5")):
+    for dark in (text.replace("M3", "M4 I"), text.replace("S100", "S0"), text.replace("M3", "M5")):
         assert "dwell" not in codes(dark, marlin)
     assert "dwell" not in codes("M3 S100\nG4 P0.5\nM5\n")  # laser mode is dark under G0
 
