@@ -16,7 +16,7 @@ import numpy as np
 
 from miurafab.geometry.arrays import Bools, Floats, Ints, places_among
 from miurafab.geometry.nearest import tree_of
-from miurafab.origami.energy.touching import HEIGHT, NO_PAIRS, TouchPairs, gaps
+from miurafab.origami.energy.touching import CLOSEST, HEIGHT, NO_PAIRS, TouchPairs, gaps
 
 REACH = 0.35
 """Mean edges within which two things are a pair."""
@@ -132,7 +132,8 @@ class NearPairs:
 
 class LastingPairs(NearPairs):
     """Pairs that keep the g at which they were found first, so that the energy of their springs is
-    one of the shape alone, on a long way too.
+    one of the shape alone, on a long way too. What touches at ``rest``, as both sides of a cut do,
+    is no pair: nothing could move there.
     """
 
     def __init__(self, triangles: Ints, edges: Ints, hinges: Ints, rest: Floats) -> None:
@@ -142,6 +143,8 @@ class LastingPairs(NearPairs):
     def at(self, points: Floats) -> TouchPairs:
         """The pairs at ``points`` (V, 3) that are within ``REACH``."""
         keys, pairs = self._within(points, REACH)
+        apart = pairs.height > LOWER * CLOSEST
+        keys, pairs = keys[apart], pairs.those(apart)
         at, weight = places_among(self._known, keys), pairs.weight.copy()
         weight[at >= 0] = self._weights[at[at >= 0]]
         known = np.concatenate([self._known, keys[at < 0]])

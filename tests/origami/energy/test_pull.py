@@ -14,6 +14,7 @@ from problems import regular
 
 from miurafab.errors import InputError, PatternError
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.cut_open import cut_open
 from miurafab.origami.energy import pull as pulling
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
 from miurafab.origami.energy.held_apart import CLOSING, TouchingDriven
@@ -254,6 +255,25 @@ def test_facets_that_pass_through_each_other_are_told(monkeypatch):
     assert pulled.piercings == 0
     assert not pulled.touching
     assert through not in pulled.verdict()
+
+
+def test_what_touches_in_the_folded_form_holds_nothing_up():
+    """Both sides of a cut lie on each other there: "the way was lost at a strain of 0"."""
+    whole = regular(5, 5)
+    letters = whole.edges_assignment.copy()
+    letters[21] = "C"  # from the border inwards
+    curve = pull(
+        cut_open(replace(whole, edges_assignment=letters)),
+        PAPER,
+        (0, 24),
+        strain=-0.3,
+        steps=2,
+        cycles=1,
+    )
+    assert curve.touching
+    assert curve.converged
+    assert curve.extensions.min() == pytest.approx(-0.3 * curve.distances[0])
+    assert curve.piercings == 1  # the facets beside the cut
 
 
 def test_a_sheet_that_jams_is_lost_there():
