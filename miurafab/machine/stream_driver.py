@@ -23,9 +23,11 @@ from miurafab.machine.known_controller import KnownController
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import AS_WRITTEN, JobAborted, Overrides, Progress, StreamResult
 from miurafab.machine.session import Session
+from miurafab.machine.sleeping import slept_s
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
 
+_SLEPT_S = 1.0  # a shorter sleep is over before the controller has made what it holds
 _TELL_S = 0.2  # between two progress reports for a machine that does not report its position
 
 
@@ -71,6 +73,7 @@ class StreamDriver(ABC):
         self._records = [r for r in (context.transcript, context.journal) if r is not None]
         self._overrides = AS_WRITTEN
         self._overridden: set[Overrides] = set()
+        self._slept = slept_s()
 
     # Defined by each dialect
 
@@ -142,14 +145,25 @@ class StreamDriver(ABC):
         """Serve the files and the keys; called many times a second during every wait.
 
         Raises :class:`~miurafab.machine.progress.JobAborted` if the user ends the job, and
-        :class:`~miurafab.errors.MachineError` for a journal that cannot be written: the job could
-        not be resumed. A transcript that cannot be written is told at the end.
+        :class:`~miurafab.errors.MachineError` for a journal that cannot be written, since the job
+        could not be resumed, and where the computer slept: nobody may stand at the machine when it
+        wakes. A transcript that cannot be written is told at the end.
         """
+        self._watch_for_sleep()
         if self.journal is not None:
             self.journal.taken(self.acknowledged, self.line, self._seconds)
             self.journal.check()
         self._take_keys()
         self.obey()
+
+    def _watch_for_sleep(self) -> None:
+        before, self._slept = self._slept, slept_s()
+        slept = self._slept - before
+        if slept > _SLEPT_S and self._context.transport.blocks and not self.held:
+            raise MachineError(
+                f"The computer slept for {slept:.0f} s while it sent {self.plan.job.name}, and "
+                "nobody may have watched the machine since"
+            )
 
     def _take_keys(self) -> None:
         known = keys_of(self.plan.machine.dialect)

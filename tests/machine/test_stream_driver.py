@@ -10,8 +10,9 @@ import pytest
 from session_walk import JOB, MACHINE
 from wires import FakeWire
 
-from miurafab.errors import ControllerError
+from miurafab.errors import ControllerError, MachineError
 from miurafab.gcode.job import Job
+from miurafab.machine import stream_driver
 from miurafab.machine.append_log import DurableFile
 from miurafab.machine.dialects import virtual_machine
 from miurafab.machine.journal import read_journal
@@ -93,6 +94,26 @@ def test_the_end_of_a_job_says_how_many_lines_the_machine_acknowledged(tmp_path:
     assert failed.why == sentence
     end = "15 lines were acknowledged, and the controller was reset and reports the beam off."
     assert sentence.endswith(f" of {end}")
+
+
+@pytest.mark.parametrize("real", [True, False])
+@pytest.mark.parametrize("held", [True, False])
+def test_a_job_that_the_computer_slept_through_is_stopped_unless_it_was_held(
+    monkeypatch: pytest.MonkeyPatch, real: bool, held: bool
+) -> None:
+    wire = new_wire()
+    wire.blocks = real
+    monkeypatch.setattr(stream_driver, "slept_s", lambda: 7.0 + 600.0 * (wire.now() > 3.0))
+    slow = plan_job(Job("slow.nc", "M4 S0\nG1 X30 S500 F300\nM5\n"), MACHINE)
+    keys = Keys(wire, *([(2.0, " "), (4.0, "r")] if held else []))
+    if held or not real:
+        deliver(slow, wire, StopSignals(), keys=keys)
+        assert wire.device.position[0] == pytest.approx(30.0)
+    else:
+        with pytest.raises(MachineError, match=r"slept for 600 s while it sent slow\.nc, .* off"):
+            deliver(slow, wire, StopSignals(), keys=keys)
+        assert wire.commands.endswith(b"\x18")
+        assert not wire.device.beam_on
 
 
 def test_a_journal_has_a_record_for_each_change_of_the_overrides_and_no_other(
