@@ -98,6 +98,20 @@ def square_twist(lean: float = -15.0, far: float = 1.6) -> CreasePattern:
     return drawn(lines)
 
 
+def hexagon_twist(turn: float = 45.0, far: float = 3.0) -> CreasePattern:
+    """A hexagon that turns, with six pleats, which leave its sides by ``turn`` degrees."""
+    corners = [(math.cos(math.radians(at)), math.sin(math.radians(at))) for at in range(0, 360, 60)]
+    lines, rim = [], []
+    for k, (x, y) in enumerate(corners):
+        after = corners[(k + 1) % 6]
+        way = math.atan2(after[1] - y, after[0] - x) - math.radians(turn)
+        step = (far * math.cos(way), far * math.sin(way))
+        ends = [(a + step[0], b + step[1]) for a, b in ((x, y), after)]
+        lines += [((x, y), after, "V", A), ((x, y), ends[0], "M", A), (after, ends[1], "V", A)]
+        rim += ends
+    return drawn([*border(*rim), *lines])
+
+
 def windmill() -> CreasePattern:
     """The windmill base: its square in the middle keeps it from folding with flat facets."""
     lines = border((-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0))

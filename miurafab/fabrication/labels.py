@@ -272,6 +272,8 @@ def _convex(points: Floats, count: Ints) -> tuple[Floats, Ints]:
         inner = part[0][0, : part[1][0]]
         step = np.linalg.norm(np.roll(inner, -1, axis=0) - inner, axis=1)
         inner = inner[step > 1e-9 * np.linalg.norm(side, axis=1).sum()]  # a side needs a direction
+        more = max(len(inner) - points.shape[1], 0)  # each bay may leave two corners for one
+        points = np.pad(points, ((0, 0), (0, more), (0, 0)))
         points[facet, : len(inner)], count[facet] = inner, len(inner)
     return points, count
 

@@ -17,6 +17,7 @@ from miurafab.fabrication.partition.patch_outline import outline_patches
 from miurafab.fabrication.seam_names import LETTERS, tab_labels
 from miurafab.fabrication.sheets import lay_out
 from miurafab.fabrication.tab_choice import choose_tabs
+from miurafab.origami.crease_pattern import CreasePattern
 
 FRONT = Sides("front", "front", "front")
 ALPHABET = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ-./%" + LETTERS
@@ -125,3 +126,13 @@ def test_texts_that_find_no_room_are_counted():
     layout = lay_out(miura(60, 50, 2.5, 2.5), bed(100.0, 90.0), card(tab=1.5))
     (finding,) = [each for each in layout.findings if each.code == "unlettered"]
     assert int(finding.sentence.split()[0].replace(",", "")) > 0
+
+
+def test_a_facet_with_a_shallow_bay_has_a_place_for_a_name_of_more_corners_than_its_own() -> None:
+    """Its convex part has six, and the layout ended with a ValueError."""
+    points, ring = np.array([[4.0, 24], [11, 34], [43, 29], [53, 41], [9, 48]]), np.arange(5)
+    sheet = CreasePattern(
+        points, np.column_stack([ring, (ring + 1) % 5]), np.full(5, "B"), np.zeros(5), ring[None]
+    )
+    made = lay_out(sheet, bed(400, 300), card())
+    assert made.totals.patches == 1

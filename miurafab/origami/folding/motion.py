@@ -142,6 +142,21 @@ def _from_flat(
         )
         if its_verdict.is_better_than(verdict):
             softness, motion, verdict = SOFTER, soft, its_verdict
+    with_contact = partial(
+        ramp_motion,
+        pattern,
+        steps,
+        touching=True,
+        waiting=waiting,
+        on_progress=_named(on_progress, "with contact"),
+    )
+    met = None
+    if verdict.is_held_back and again and verdict.seed_signs == 1.0:
+        # all folds begin as they shall, so that it is what they meet on the way that turns them
+        with suppress(PatternError):
+            met = with_contact()
+            if met[1].is_better_than(verdict):
+                motion, verdict = met
     # beside a curved crease facets bend, so that what flat ones could not do says nothing
     ruled = is_ruled(pattern)
     if not again and (verdict.is_held_back or contacts(motion)):
@@ -152,15 +167,7 @@ def _from_flat(
         # where it ends before its first frame, or the folds go astray, the contacts of the way
         # without it are told
         with suppress(PatternError):
-            progress = _named(on_progress, "with contact")
-            apart, its_verdict = ramp_motion(
-                pattern,
-                steps,
-                touching=True,
-                softness=softness,
-                waiting=waiting,
-                on_progress=progress,
-            )
+            apart, its_verdict = met or with_contact(softness=softness)
             if _waits(its_verdict, ruled) or its_verdict.wrong_signs <= MOST_WRONG:
                 motion, verdict = apart, its_verdict
         if _waits(verdict, ruled):  # without contact such folds pass through the sheet

@@ -70,7 +70,8 @@ class RampVerdict:
     def is_better_than(self, other: RampVerdict) -> bool:
         """Whether the way comes nearer to what is asked of it than the ``other`` way."""
         if self.complete and self.wrong_signs <= MOST_WRONG:
-            return other.wrong_signs > MOST_WRONG or self.angle_error < other.angle_error
+            astray = not other.complete or other.wrong_signs > MOST_WRONG
+            return astray or self.angle_error < other.angle_error
         return False
 
 
@@ -144,7 +145,7 @@ def ramp_motion(
     if not count:
         if is_ruled(pattern):
             raise _unfollowed(pattern, float(parts[1]))
-        raise _stuck(paths, waiting)
+        raise _stuck(paths, waiting, float(parts[1]))
     flat = np.pad(pattern.vertices_coords, ((0, 0), (0, 1)))
     frames = np.repeat(flat[None], count + 1, axis=0)
     angles = np.zeros((count + 1, len(pattern.edges_vertices)))
@@ -214,20 +215,25 @@ def _unfollowed(pattern: CreasePattern, part: float) -> PatternError:
     )
 
 
-def _stuck(paths: list[RampPath], waiting: Ints) -> PatternError:
-    """The error for a pattern that does not leave the plane."""
+def _stuck(paths: list[RampPath], waiting: Ints, part: float) -> PatternError:
+    """The error for a pattern that is not followed to its first frame, at the ``part`` of its fold
+    angles.
+    """
+    where = (
+        f"The pattern could not be followed to its first position, at {part:.0%} of its fold angles"
+    )
     if not len(waiting):
         return PatternError(
-            "The pattern could not be brought out of the plane, though every fold can start to the "
-            "side that its letter tells. Very thin facets can be the cause: convert the file with "
-            "a larger `tolerance`, which joins lines that nearly meet."
+            f"{where}, though with flat facets every fold can start to the side that its letter "
+            "tells: its facets have to bend or to stretch there, as in some twists, or they are "
+            "very thin. Ask for more `steps`, so that it is nearer to flat, or convert the file "
+            "with a larger `tolerance`, which joins lines that nearly meet."
         )
-    folds = sum(len(path.sprung) for path in paths)
     return AstrayError(
-        f"The pattern could not be brought out of the plane: with flat facets {len(waiting)} of "
-        f"its {folds} folds cannot begin from flat if none shall turn to its wrong side, the first "
-        "being edge {waiting}. Either letters are wrong, or its facets have to bend from "
-        "the start, as in some twists, or it folds in a sequence, crease after crease, which one "
-        "motion of all creases cannot show.",
+        f"{where}: with flat facets {len(waiting)} of "
+        f"its {sum(len(path.sprung) for path in paths)} folds cannot begin from flat if none shall "
+        "turn to its wrong side, the first being edge {waiting}. Either letters are wrong, or its "
+        "facets have to bend from the start, as in some twists, or it folds in a sequence, crease "
+        "after crease, which one motion of all creases cannot show.",
         waiting=int(waiting[0]),
     )

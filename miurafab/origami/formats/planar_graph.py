@@ -233,7 +233,8 @@ def faces_of_plane_graph(points: Floats, sides: Ints) -> Ints:
     before = np.where(rank > first[tail], rank - 1, first[tail] + degree[tail] - 1)
     following = order[before][twin]
     loop = components(count, np.arange(count), following)
-    cross = points[tail, 0] * points[head, 1] - points[tail, 1] * points[head, 0]
+    near = points - points[0]  # far from the origin products of coordinates have no digits left
+    cross = near[tail, 0] * near[head, 1] - near[tail, 1] * near[head, 0]
     alone = loop != loop[twin]  # a walk along which each side is gone both ways encloses nothing
     inside = np.flatnonzero((np.bincount(loop, cross) > 0) & (np.bincount(loop, alone) > 0))
     start = np.unique(loop, return_index=True)[1]

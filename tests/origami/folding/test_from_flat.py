@@ -32,7 +32,7 @@ from miurafab.origami.folding.kinematics import (
 )
 from miurafab.origami.folding.motion import FoundMotion, find_motion
 from miurafab.origami.folding.ramp_motion import ramp_motion
-from miurafab.origami.folding.ramp_walk import FIRMER
+from miurafab.origami.folding.ramp_walk import FIRMER, RampWalk
 from miurafab.origami.formats.fold_frames import frame_titles
 
 RIGID = {
@@ -123,6 +123,25 @@ def test_a_square_twist_bends_and_says_where() -> None:
     assert not len(found.verdict.wrong_edges)
     assert found.verdict.complete
     assert "bent-facets" in {finding.code for finding in motion_findings(found, ())}
+
+
+def test_a_hexagon_twist_folds_where_its_facets_hold_each_other_off() -> None:
+    """Without contact its way ended at 36 % of the fold angles."""
+    found = find_motion(named_patterns.hexagon_twist(30.0), 5)
+    assert found.verdict is not None
+    assert (found.verdict.complete, found.verdict.touching) == (True, True)
+    assert not len(found.verdict.wrong_edges)
+
+
+@pytest.mark.parametrize(
+    ("turn", "why"),
+    [(45.0, "every fold can start to the side"), (60.0, "6 of its 18 folds cannot")],
+)
+def test_what_is_lost_before_its_first_position_is_told(turn, why, monkeypatch) -> None:
+    """It had left flat, and the program said that it could not be brought out of the plane."""
+    monkeypatch.setattr(RampWalk, "reach", lambda *_: False)
+    with pytest.raises(PatternError, match=f"first position, at 18% of its fold angles.*{why}"):
+        find_motion(named_patterns.hexagon_twist(turn), 5)
 
 
 def test_a_sheet_that_is_held_back_is_folded_with_softer_sides() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -387,6 +388,14 @@ def test_a_sheet_is_found_again_from_its_whole_fold_lines() -> None:
     found = pattern_from_lines(CreaseLines(ends, np.full(len(ends), "U"), np.zeros(len(ends))))
     assert len(found.faces_vertices) == len(pattern.faces_vertices)
     assert len(found.vertices_coords) == 35
+
+
+def test_a_small_drawing_far_from_the_origin_is_read_as_near_it() -> None:
+    """The area of its facets had no digit left, and their outside passed for a facet."""
+    lines = drawn(*SQUARE, ("M", 0, 0, 2, 2), ("V", 0, 2, 2, 0))
+    far = pattern_from_lines(replace(lines, ends=1e-7 * lines.ends + 1e4))
+    assert len(far.faces_vertices) == 4
+    assert area_of(far) == pytest.approx(4e-14, rel=1e-3)
 
 
 def test_a_single_sheet_without_creases_stays() -> None:
