@@ -34,6 +34,7 @@ OPTIONS = ("-q", "-x", "-n", "0", "-p", "no:cacheprovider", "--no-header", "--tb
 PLAIN = ("--assert=plain",)
 """Nobody reads how a test fails, and to rewrite its assertions takes longer than most tests."""
 SLOW_S = 0.5
+FORKED_S = 0.05  # what a test takes beside its own work
 TOGETHER = 40
 """Faults for which the tests are collected once."""
 BROKEN = 99
@@ -80,7 +81,7 @@ class Ordered:
 
 class Host(Ordered):
     """Runs the tests on one fault after another, each in a fork, when they are collected; tests
-    that saw most faults before come first.
+    that saw most faults in their time before come first.
     """
 
     def __init__(self, faults: list[dict], known: dict) -> None:
@@ -96,7 +97,7 @@ class Host(Ordered):
             lines = {(fault["module"], line) for line in lines_of(was)}
             ran = self.known["lines"]
             order = [n for n in order_of(fault, self.known) if not lines.isdisjoint(ran[n])]
-            self.order = sorted(order, key=lambda name: -self.seen[name])
+            self.order = sorted(order, key=self._worth)
 
             def work(was=was, becomes=becomes):
                 for function in functions[place_of(was)]:
@@ -111,6 +112,9 @@ class Host(Ordered):
             self.ends.append((how, took))
             self.seen[failing] += how == "killed"
         return True
+
+    def _worth(self, name: str) -> float:
+        return -self.seen[name] / (self.known["seconds"][name] + FORKED_S)
 
     def pytest_internalerror(self, excrepr):
         self.ends = [(str(excrepr), 0.0)]
