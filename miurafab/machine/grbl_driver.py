@@ -74,8 +74,7 @@ class GrblDriver(StreamDriver):
         self._doubtful_reports = 0  # that may tell whether a resume was heard
         self._listened = 0.0  # seconds; what shows the progress may take longer than a patience
         self._heard_at = 0.0  # of these, when it last answered or was busy
-        self._answered_at = 0.0
-        self._stopped_with_an_answer = False
+        self._answered_at = 0.0  # ... when it last answered
         self._stopped_at: float | None = None  # ... and when it stopped in mid-job
         self._lit_holds = 0  # reports in a row of a hold with the beam on
 
@@ -229,9 +228,8 @@ class GrblDriver(StreamDriver):
             return
         if self._stopped_at is None:
             self._stopped_at = self._listened
-            self._stopped_with_an_answer = self._listened - self._answered_at < 2 * _POLL_S
         stopped, name = self._listened - self._stopped_at, self.plan.job.name
-        late = self._late_pause() if _rests(report) and stopped > ANSWER_S else None
+        late = self._late_pause(self._stopped_at) if _rests(report) and stopped > ANSWER_S else None
         if late is not None:
             first = self._session.connection.in_flight[0].number
             raise ControllerError(
@@ -253,7 +251,7 @@ class GrblDriver(StreamDriver):
             return False
         return report.beam_on or (self._burns_in_hold and not report.beam_off and not pauses)
 
-    def _late_pause(self) -> int | None:
+    def _late_pause(self, begun: float) -> int | None:
         """The line behind the first that is owed at whose pause the head stands, if there is one;
         GRBL has answered all lines before it, then. A hold in a dwell stands there, too, but that
         does not begin with an answer, as the pause behind a dwell does.
@@ -262,7 +260,7 @@ class GrblDriver(StreamDriver):
         if program is None:
             return None
         for before, line in pairwise(self._session.connection.in_flight):
-            if dwell_seconds(before.data) and not self._stopped_with_an_answer:
+            if dwell_seconds(before.data) and begun > self._answered_at + 2 * _POLL_S:
                 return None
             if self._is_at_pause(program, line.number):
                 return line.number

@@ -722,6 +722,31 @@ def test_a_hold_that_stays_lit_in_laser_mode_ends_the_job() -> None:
     assert b"\x18" in wire.commands
 
 
+def test_a_hold_that_the_first_report_tells_may_be_lit_twice() -> None:
+    wire = told(b">", b"|A:S>", 2)
+    due = [b"!"]
+
+    def press(call: int) -> None:
+        if due and b"M4S0" in wire.commands:
+            wire.device.receive(due.pop())
+        if wire.now() > 9.0:
+            wire.device.receive(b"~")
+
+    wire.before_call = press
+    job = Job("held.nc", "M4 S0\nG1 X20 S500 F3000\nM5\n")
+    assert deliver(plan_job(job, MACHINE), wire, StopSignals()).lines == 3
+    assert wire.count == 0
+
+
+def test_a_first_answer_that_is_lost_is_waited_for_three_seconds() -> None:
+    wire = losing(b"M5", 1)
+    with pytest.raises(
+        ControllerError, match=r"is idle but has not answered line 1 of a\.nc for 3 s"
+    ):
+        deliver(plan_job(Job("a.nc", "M5\n"), MACHINE), wire, StopSignals())
+    assert 3.0 < wire.now() < 4.0
+
+
 def test_who_is_at_the_keys_may_hold_as_long_as_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("miurafab.machine.grbl_driver._HELD_S", 10.0)
     job = Job("held.nc", "M4 S0\nG1 X20 S500 F300\nM5\n")
