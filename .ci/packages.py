@@ -218,7 +218,7 @@ def _break(name: str, how: str, python: Path, site: Path) -> None:
     if how == "gone":
         run(python, "-m", "pip", "uninstall", "--yes", *QUIET, name, cwd=site)
     elif how == "does not load":
-        (module,) = site.glob(f"{MODULES.get(name, name)}/__init__.py")
+        (module,) = site.glob(f"{MODULES.get(name, name.replace('-', '_'))}/__init__.py")
         module.write_text("raise ImportError('broken on purpose')\n")
     else:
         plain = name.lower().replace("-", "_")
