@@ -22,7 +22,7 @@ from miurafab.units import DECIMAL
 _BLANK = r"(?:[ \t/]|\([^)\r\n]*\))*+"
 # The words in a line without comments and blanks.
 _WORD = re.compile(rf"([A-Z])([-+]?{DECIMAL})(?![\d.])")
-_LINE_NUMBER = re.compile(r"N\d+")
+_FIRST_WORD = re.compile(rf"(?:N\d+)?{_WORD.pattern}")
 _POWER = re.compile(rf"S\+?({DECIMAL})")
 _NO_DWELL = re.compile(r"G0*4[PS][+-]?0*\.?0*$")
 _LINE_END = re.compile(r"[\r\n]")
@@ -37,9 +37,7 @@ class _Words:
         others = "|".join(str(number) for number in range(100) if number not in numbers)
         plain = rf"{_BLANK}0*(?:{others})(?:\.0*)?{_BLANK}(?:[A-Za-z\r\n;]|\Z)"
         # Finds each word of the letter in a text that is not plainly another one.
-        self.anywhere = re.compile(
-            rf"[{letter}{letter.lower()}](?!{plain})(?={_BLANK}[-+.\d])", re.ASCII
-        )
+        self.anywhere = re.compile(rf"[{letter}{letter.lower()}](?!{plain})(?={_BLANK}[-+.\d])")
 
     def among(self, code: str) -> list[int]:
         """The numbers of those in ``code``, a line without comments and blanks."""
@@ -47,7 +45,7 @@ class _Words:
 
     def begin(self, code: str) -> bool:
         """Whether ``code`` begins with one, behind the number of the line."""
-        first = _WORD.match(_LINE_NUMBER.sub("", code, count=1))
+        first = _FIRST_WORD.match(code)
         return first is not None and bool(self._read(first))
 
     def _read(self, word: re.Match[str]) -> tuple[int, ...]:
