@@ -14,6 +14,7 @@ from miurafab.options import read_options
 from miurafab.options.documented import described
 from miurafab.options.verbs import verb
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.cut_open import cut_open
 from miurafab.origami.unfold import FLAT_ANGLE
 from miurafab.profiles import Material, read_material
 from miurafab.workflow.energy_options import CYCLES, STRAIN, EnergyOptions
@@ -120,10 +121,12 @@ def energy(
 
 
 def _with_folded_form(pattern: PatternLike) -> CreasePattern:
-    """The pattern, with the last shape of its motion from flat where it has no folded form."""
+    """The pattern opened along its cuts, with the last shape of its motion from flat where it has
+    no folded form.
+    """
     found = as_pattern(pattern)
     if found.folded_coords is not None:
-        return consistent_pattern(pattern)
+        return cut_open(consistent_pattern(pattern))
     found = movable_pattern(pattern)
 
     from miurafab.origami.folding.motion import find_motion

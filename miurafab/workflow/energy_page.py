@@ -14,6 +14,7 @@ import numpy as np
 from miurafab.errors import InputError
 from miurafab.geometry.arrays import Floats
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.cut_open import cut_open
 from miurafab.origami.energy.curve import EnergyCurve
 from miurafab.origami.energy.pieces import PieceEnergies
 from miurafab.origami.energy.pull import PullCurve
@@ -41,6 +42,7 @@ def write_energy_page(
             f"{path.name} is not written: the page shows one piece, and this pattern has several; "
             "write a plot (.png, .svg) or a table (.csv)."
         )
+    pattern = cut_open(pattern)  # as it was unfolded or pulled
     frames, slider = _pulled(result) if isinstance(result, PullCurve) else _unfolded(result)
     slider = replace(
         slider,

@@ -66,6 +66,43 @@ def test_a_pull_has_its_force_over_its_extension_in_newtons(tmp_path: Path) -> N
     assert (told["word"], told["rigid"]) == ("Pulling", False)
 
 
+def two_flaps() -> CreasePattern:
+    """A square with two flaps on one side, folded by 60 degrees, which a cut parts."""
+    flat = [[0, 0], [2, 0], [2, 1], [2, 2], [0, 2], [3, 0], [3, 1], [3, 2]]
+    edges = [[1, 2], [2, 3], [2, 6], [0, 1], [1, 5], [5, 6], [6, 7], [7, 3], [3, 4], [4, 0]]
+    facets = [[0, 1, 2, 3, 4], [1, 5, 6, 2, -1], [2, 6, 7, 3, -1]]
+    points, turn = np.array(flat) * 20.0, np.radians(60)
+    out = np.maximum(points[:, 0] - 40, 0)
+    folded = np.column_stack(
+        [points[:, 0] - out * (1 - np.cos(turn)), points[:, 1], out * np.sin(turn)]
+    )
+    return CreasePattern(
+        vertices_coords=points,
+        edges_vertices=np.array(edges),
+        edges_assignment=np.array(list("VVC" + 7 * "B")),
+        edges_fold_angle=np.array([turn, turn] + 8 * [0.0]),
+        faces_vertices=np.array(facets),
+        folded_coords=folded,
+    )
+
+
+def test_a_cut_holds_nothing_together_and_opens_on_the_page(tmp_path: Path) -> None:
+    """Of a folded form a cut was as stiff as a crease, and of a drawing no page was written."""
+    pattern = two_flaps()
+    result = energy(pattern, 2, pull=(0, 5), strain=0.05, cycles=1)
+    assert isinstance(result, PullCurve)
+    assert len(result.slips) == 2
+    other = np.linalg.norm(result.coords[:, 7] - result.coords[:, 4], axis=1)
+    assert np.ptp(other) <= 1e-9 < 1 < np.ptp(result.distances)
+    write_energy_page(result, pattern, tmp_path / "pull.html")
+    told = fold_of(tmp_path / "pull.html")
+    step = max(told["forms"][2]["box"][3:]) / 65535
+    assert np.abs(motion_of(told) - result.coords).max() <= step
+    # both sides of the cut are edges of the page
+    edges = np.frombuffer(base64.b64decode(told["edges"]), "<u4")
+    assert len(edges) == 2 * (len(pattern.edges_vertices) + 1)
+
+
 @pytest.mark.parametrize("material", [None, "card-250"])
 def test_the_way_from_flat_ends_in_the_folded_form(tmp_path: Path, material: str | None) -> None:
     pattern = sheet()
