@@ -19,6 +19,7 @@ from miurafab.errors import ControllerError, MachineError, PortError
 from miurafab.gcode.job import SendLine
 from miurafab.grbl.connection import FEED_HOLD, SOFT_RESET, STATUS_QUERY, Connection
 from miurafab.grbl.events import Alarm, Banner, Error, Event, Ok, Setting, StatusReport
+from miurafab.grbl.lines import is_system
 from miurafab.grbl.settings import Settings
 from miurafab.grbl.states import State
 from miurafab.grbl.streamer import alarm_words, error_words
@@ -357,8 +358,11 @@ class Session:
     def hold_and_stop(self) -> bool:
         """Let the motion come to rest before the reset, so that the position is not lost.
 
-        For a job whose controller still obeys; the feed hold is the first thing on the wire.
+        For a job whose controller still obeys; the feed hold is the first thing on the wire, but in
+        homing, which hears none.
         """
+        if any(is_system(line.data) for line in self.connection.in_flight):
+            return self.stop()
         try:
             self._transport.write_now(self.connection.send_realtime(FEED_HOLD))
             if self.transcript is not None:

@@ -724,6 +724,23 @@ def test_a_signal_ends_the_homing_before_a_job() -> None:
     assert reset - begun < 0.2
 
 
+def test_a_key_ends_the_homing_before_a_job_at_once() -> None:
+    """GRBL hears no hold meanwhile, and answers nothing."""
+    wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE) | HOMING, baud=115_200))
+
+    class Stops:
+        def pressed(self) -> str:
+            return "q" if b"$H" in wire.commands else ""
+
+    session = MachineSession(wire, StopSignals(), PortSetup.of(MACHINE), Stops())
+    session.unlock()
+    session.jog(x=-100.0)
+    with pytest.raises(JobStopped, match="stopped at the keyboard"):
+        session.cut(replace(JOB, options=replace(JOB.options, home=True)))
+    begun, reset = (next(t for t, sent in wire.written if d in sent) for d in (b"$H\n", b"\x18"))
+    assert reset - begun < 0.2
+
+
 def test_a_signal_ends_a_session_with_the_reset_first() -> None:
     signals = StopSignals()
     wire = FakeWire(VirtualGrbl(virtual_settings(MACHINE), baud=115_200))
