@@ -150,6 +150,22 @@ def test_a_ring_is_opened_and_that_is_told() -> None:
     assert mf.check(read).valid
 
 
+def test_a_state_with_an_order_of_layers_and_no_class_is_a_folded_form() -> None:
+    """Of ten such states of Line Folder, `check` said that facets lie turned over."""
+    corners = [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [0.5, 1]]
+    state = {
+        "vertices_coords": [[min(x, 1 - x), y] for x, y in corners],
+        "faces_vertices": [[0, 4, 5, 3], [4, 1, 2, 5]],
+        "faceOrders": [[1, 0, 1]],
+    }
+    read = parse_fold(state)
+    assert [finding.code for finding in read.told] == ["unfolded"]
+    assert np.ptp(read.vertices_coords, axis=0) == pytest.approx([1, 1])
+    assert sorted(np.unique(read.edges_assignment)) in (["B", "M"], ["B", "V"])
+    assert mf.check(read).valid
+    assert not mf.check(parse_fold({**state, "faceOrders": []})).valid
+
+
 def test_several_sheets_and_a_sheet_with_a_hole() -> None:
     square = np.array([[x, y, 0.0] for y in range(4) for x in range(4)])
     faces = [

@@ -43,8 +43,12 @@ _TURNED_OVER = math.radians(170)
 
 
 def is_folded(frame: Mapping[str, Any]) -> bool:
-    """Whether a plane ``frame`` of class foldedForm is folded flat: both sides of it show."""
-    if "foldedForm" not in classes_of(frame) or "faces_vertices" not in frame:
+    """Whether a plane ``frame`` is folded flat: of class foldedForm, or of none and with an order
+    of layers, and both sides of it show.
+    """
+    classes = classes_of(frame)
+    told = "foldedForm" in classes or (not classes and bool(frame.get("faceOrders")))
+    if not told or "faces_vertices" not in frame:
         return False
     sheet = _Sheet.of(frame)
     areas = signed_areas(sheet.points[:, :2][filled(sheet.faces)])
