@@ -11,6 +11,7 @@ import sys
 import pytest
 from command_line import Done
 from hypothesis import HealthCheck, settings
+from kept_fits import KeptFits
 from running_order import place
 
 from miurafab.__main__ import main
@@ -29,6 +30,25 @@ if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_I
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+RUNNING = pytest.StashKey()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item):
+    item.config.stash[RUNNING] = item
+
+
+@pytest.fixture(autouse=True, scope="session")
+def kept_fits(request, tmp_path_factory):
+    """Several workers keep their fits for each other; a process alone makes all anew."""
+    if hasattr(request.config, "workerinput"):
+        from miurafab.origami.fitting import fit  # only here: it loads much
+
+        folder = tmp_path_factory.getbasetemp().parent / "fits"
+        folder.mkdir(exist_ok=True)
+        fit._fitted = KeptFits(folder, lambda: request.config.stash[RUNNING], fit._fitted)
 
 
 def pytest_collection_modifyitems(items):

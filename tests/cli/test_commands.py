@@ -226,6 +226,7 @@ def test_fit_then_check_recomputes_the_same_numbers(run, tmp_path):
         assert again[name] <= 1e-10
 
 
+@pytest.mark.anew
 def test_the_same_fit_gives_the_same_bytes(run, tmp_path):
     for name in ("a.fold", "b.fold"):
         assert run("fit", "sphere", "--facets", "8x8", "-o", tmp_path / name).returncode == 0

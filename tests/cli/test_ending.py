@@ -172,6 +172,7 @@ def test_what_else_python_drops_is_reported_as_ever(monkeypatch):
     assert not ctrl_c.came
 
 
+@pytest.mark.anew
 def test_an_interrupted_fit_writes_its_best_sheet(run, monkeypatch, tmp_path):
     """Ctrl-C comes after the first sheet, which is too far from the target."""
     asked = miurafab.fit

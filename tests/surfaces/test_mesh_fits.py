@@ -63,6 +63,7 @@ def test_nine_in_ten_of_all_are_answered(tmp_path):
     assert sum(good) >= 0.9 * len(SHAPES)
 
 
+@pytest.mark.anew
 def test_where_no_sheet_is_found_a_smaller_part_is_taken_and_said(monkeypatch):
     """All starts fail by force but those of the last resort."""
     run = fit_module.polished
