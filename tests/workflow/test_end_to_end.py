@@ -2,11 +2,12 @@
 
 import json
 import math
+import shutil
 
 import numpy as np
 import pytest
 from gcode_reader import read_strokes
-from problems import saddle_mesh
+from problems import regular, saddle_mesh
 
 import miurafab
 from miurafab.errors import InputError, LayoutError, ProfileError
@@ -132,24 +133,26 @@ def test_each_crease_and_each_outline_exactly_once(made, target):
         assert min(np.abs(ring - same).max(), np.abs(ring - other).max()) <= 1e-3
 
 
-def test_a_job_made_again_leaves_no_sheet_of_the_last(tmp_path, made):
-    fold, _ = made["hypar"]
-    job = tmp_path / "job"
-    miurafab.sheets(fold, "grbl-laser-400", "card-250").write(job)
+@pytest.fixture
+def small(tmp_path):
+    """A pattern that takes one small sheet."""
+    fold = tmp_path / "small.fold"
+    regular().save(fold)
+    return fold
+
+
+def test_a_job_made_again_leaves_no_sheet_of_the_last(tmp_path, made, small):
+    job = shutil.copytree(made["hypar"][1], tmp_path / "job")
     before = {file.name for file in job.iterdir()}
-    small = tmp_path / "small.fold"
-    wanted = miurafab.design("hypar", facets="6x6", size="60mm")
-    miurafab.fit(wanted).pattern.save(small)
     miurafab.sheets(small, "grbl-laser-400", "card-250").write(job)
     assert {f.name for f in job.glob("sheet-*")} < before
     assert [f.name for f in job.glob("*.nc")] == ["sheet-01.nc"]
 
 
-def test_foreign_gcode_in_the_directory_is_not_touched(tmp_path, made):
-    fold, _ = made["hypar"]
+def test_foreign_gcode_in_the_directory_is_not_touched(tmp_path, small):
     (tmp_path / "mine.nc").write_text("G0 X1\n")
     with pytest.raises(InputError, match=r"mine\.nc"):
-        miurafab.sheets(fold, "grbl-laser-400", "card-250").write(tmp_path)
+        miurafab.sheets(small, "grbl-laser-400", "card-250").write(tmp_path)
     assert (tmp_path / "mine.nc").read_text() == "G0 X1\n"
     assert not (tmp_path / "layout.json").exists()
 
@@ -165,22 +168,19 @@ def test_a_bed_smaller_than_a_facet_names_the_facet(tmp_path, made):
         miurafab.sheets(fold, str(small), "card-250").write(tmp_path / "job")
 
 
-def test_an_own_machine_travels_with_the_job(tmp_path, made):
-    fold, _ = made["hypar"]
+def test_an_own_machine_travels_with_the_job(tmp_path, small):
     text = (shipped_directory("firmware_profiles") / "grbl-laser-400.toml").read_text()
     own = tmp_path / "mine.toml"
     own.write_text(text.replace("Diode laser", "My laser"))
-    miurafab.sheets(fold, str(own), "card-250").write(tmp_path / "job")
+    miurafab.sheets(small, str(own), "card-250").write(tmp_path / "job")
     own.unlink()
     assert miurafab.read_job(tmp_path / "job").machine.title.startswith("My laser")
     with pytest.raises(ProfileError, match="mine"):
-        miurafab.sheets(fold, "mine", "card-250").write(tmp_path / "other")
+        miurafab.sheets(small, "mine", "card-250").write(tmp_path / "other")
 
 
 def test_an_interrupted_job_is_no_job(tmp_path, made):
-    fold, _ = made["hypar"]
-    job = tmp_path / "job"
-    miurafab.sheets(fold, "grbl-laser-400", "card-250").write(job)
+    job = shutil.copytree(made["hypar"][1], tmp_path / "job")
     (job / "layout.json").unlink()
     with pytest.raises(InputError, match="no whole job"):
         miurafab.read_job(job)
