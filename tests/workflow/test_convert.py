@@ -112,8 +112,9 @@ def test_two_obj_files_make_the_pattern_again(saved: Path) -> None:
 
 def test_a_mesh_target_is_still_found_from_another_folder(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
-    saddle_mesh().export(tmp_path / "saddle.stl")
-    found = fit(design(str(tmp_path / "saddle.stl"), facets="4x4").request).pattern
+    saddle_mesh(11).export(tmp_path / "saddle.stl")
+    wanted = design(str(tmp_path / "saddle.stl"), facets="4x4", edge="rectangle", polish="off")
+    found = fit(wanted.request).pattern
     assert found is not None
     found.save(tmp_path / "a.fold")
     convert(tmp_path / "a.fold", tmp_path / "there" / "b.fold")
