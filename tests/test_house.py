@@ -7,6 +7,7 @@ import importlib
 import re
 import re._parser as regular  # the parser of `re`: only it tells what a repeat is
 from collections import defaultdict
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -60,6 +61,13 @@ def name(module: Path) -> str:
 @cache
 def tree(module: Path) -> ast.Module:
     return ast.parse(module.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _no_trees_are_left() -> Iterator[None]:
+    """Each collection of garbage would look at all their nodes to the end of the run."""
+    yield
+    tree.cache_clear()
 
 
 @cache
