@@ -222,5 +222,7 @@ def _scan(rings: list[Floats], count: Ints) -> Bools:
         x = a[side, 0] + part * (b[side, 0] - a[side, 0])
         at = np.ceil(x - 0.5).clip(0, count[0]).astype(np.int64) * count[1] + row
         np.add.at(flips, at, np.uint8(1))
-    inside = np.bitwise_xor.accumulate((flips % 2 == 1).reshape(-1, count[1]), axis=0)
-    return np.asarray(inside[:-1])
+    # eight cells in a byte: a quarter of the time
+    odd = np.packbits((flips & 1).reshape(-1, count[1]), axis=1)
+    inside = np.bitwise_xor.accumulate(odd, axis=0)[:-1]
+    return np.unpackbits(inside, axis=1, count=int(count[1])).view(np.bool_)
