@@ -13,8 +13,8 @@ tests marked ``anew``, of which one holds that a fit gives the same bytes.
 from __future__ import annotations
 
 import hashlib
-import os
 import pickle
+import uuid
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,8 +41,8 @@ class KeptFits:
         if request.timeout is not None or made_anew(self.running()):
             return self.make(request, on_progress, search)
         asked = hashlib.sha256(cloudpickle.dumps((request, search.__name__))).hexdigest()
-        kept = self.folder / asked
-        if kept.exists():
+        kept = next(self.folder.glob(f"{asked}-*"), None)
+        if kept is not None:
             if on_progress is not None:
                 on_progress(1.0, "done")
             return pickle.loads(kept.read_bytes())
@@ -50,9 +50,11 @@ class KeptFits:
         if result.status == "interrupted":
             return result
         written = pickle.dumps(result)
-        begun = kept.with_suffix(f".{os.getpid()}")
+        # whole or not at all; two workers that make the same fit at once write a file each
+        own = uuid.uuid4().hex
+        begun = self.folder / f"begun-{own}"
         begun.write_bytes(written)
-        begun.replace(kept)  # whole or not at all, whichever worker ends first
+        begun.rename(self.folder / f"{asked}-{own}")
         return pickle.loads(written)  # the first test gets what all others get
 
 
