@@ -113,16 +113,15 @@ def lay(
 
 
 def draw(prepared: Prepared) -> Path | None:
-    """Write the pictures and the page of a sheet that was turned beside its job, as
-    :meth:`~miurafab.workflow.preview.Preview.write` does; returns the page.
+    """Write the pictures and the page of the one sheet that is sent, if it was turned, beside its
+    job, as :meth:`~miurafab.workflow.preview.Preview.write` does; returns the page.
     """
     aligned = prepared.aligned
     if aligned is None or prepared.folder is None:
         return None
     from miurafab.workflow.preview import Preview  # which lays sheets, too
 
-    sheet = prepared.dry_runs[aligned.number - 1]
-    seen = Preview(prepared.name, prepared.machine, (sheet,), None, (aligned.finding,))
+    seen = Preview(prepared.name, prepared.machine, prepared.dry_runs, None, (aligned.finding,))
     return seen.write(prepared.folder / "aligned")[-1]
 
 

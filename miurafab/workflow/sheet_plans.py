@@ -35,37 +35,14 @@ def plan_sheets(
     ``options.from_stroke`` the first begins there. Raises
     :class:`~miurafab.errors.InputError` for a sheet that cannot be sent.
     """
-    if options.resume and options.from_stroke is not None:
-        raise OptionError(
-            "from_stroke",
-            "says where to begin, and the journal says that for `resume`; ask for one",
-        )
-    chosen = prepared.chosen(sheets)
     require_known(options.send.force)
+    starts = _starts(prepared, sheets, options)
     edits = raise_findings(prepared.findings, options.send.force, GcodeError)
     plans: list[tuple[int, JobPlan]] = []
-    begun = False
-    for number in chosen:
-        job, expected = prepared.jobs[number - 1], prepared.dry_runs[number - 1]
-        aligned = prepared.aligned
-        if aligned is not None and aligned.number != number:
-            aligned = None
-        written = job if aligned is None else aligned.written
-        resumption: Resumption | None = None
-        if options.from_stroke is not None and not plans:
-            resumption = from_stroke(written, prepared.machine, options.from_stroke)
-        if options.resume:
-            path = journal_path(prepared, job)
-            runs = read_journal(path) if path.exists() else []
-            begun = begun or bool(runs)
-            if runs and runs[-1].ended == "done":
-                continue
-            if runs:
-                resumption = resume(written, prepared.machine, runs)
-        if resumption is not None and aligned is not None:
-            resumption = aligned.rest(resumption, prepared.machine)
+    for number, resumption in starts:
+        expected = prepared.dry_runs[number - 1]
         plan = plan_job(
-            job,
+            prepared.jobs[number - 1],
             prepared.machine,
             options.send,
             resumption=resumption,
@@ -76,12 +53,47 @@ def plan_sheets(
         )
         back = prepared.back_of(number)
         plans.append((number, replace(plan, forced=edits + plan.forced, back=back)))
-    if options.resume and not (begun and plans):
+    return plans
+
+
+def _starts(
+    prepared: Prepared, sheets: Sequence[int] | None, options: CutOptions
+) -> list[tuple[int, Resumption | None]]:
+    """Which of the ``sheets`` are sent, and the rest of each that does not begin at its first line;
+    see :func:`plan_sheets`.
+    """
+    if options.resume and options.from_stroke is not None:
+        raise OptionError(
+            "from_stroke",
+            "says where to begin, and the journal says that for `resume`; ask for one",
+        )
+    starts: list[tuple[int, Resumption | None]] = []
+    begun = False
+    for number in prepared.chosen(sheets):
+        aligned = prepared.aligned
+        if aligned is not None and aligned.number != number:
+            aligned = None
+        written = prepared.jobs[number - 1] if aligned is None else aligned.written
+        resumption: Resumption | None = None
+        if options.from_stroke is not None and not starts:
+            resumption = from_stroke(written, prepared.machine, options.from_stroke)
+        if options.resume:
+            path = journal_path(prepared, prepared.jobs[number - 1])
+            runs = read_journal(path) if path.exists() else []
+            begun = begun or bool(runs)
+            if runs and runs[-1].ended == "done":
+                continue
+            if runs:
+                resumption = resume(written, prepared.machine, runs)
+        if resumption is not None and aligned is not None:
+            resumption = aligned.rest(resumption, prepared.machine)
+        starts.append((number, resumption))
+    if options.resume and not (begun and starts):
         raise InputError(
             f"No sheet of {prepared.name} was interrupted, by the journals beside it; leave "
             "`resume` out to cut."
         )
-    return plans
+    return starts
 
 
 def start_findings(
@@ -124,24 +136,23 @@ def what_is_sent(prepared: Prepared, number: int, resumption: Resumption | None)
 def rehearsed(
     prepared: Prepared, sheets: Sequence[int] | None, options: CutOptions
 ) -> tuple[Prepared, str, tuple[Finding, ...]]:
-    """``prepared`` as :func:`~miurafab.workflow.cut_sheets.cut_prepared` would send it, ``ready``
-    or ``refused``, and where its first sheet would lie and begin; no refusal raises.
+    """``prepared`` as :func:`~miurafab.workflow.cut_sheets.cut_prepared` would send it, its
+    ``dry_runs`` those of what is sent, ``ready`` or ``refused``, and where each sheet would lie and
+    begin; no refusal raises.
     """
     prepared = align(prepared, sheets, options.align)
-    first = prepared.chosen(sheets)[0]
-    resumption = None
-    if options.from_stroke is not None:
-        resumption = from_stroke(prepared.jobs[first - 1], prepared.machine, options.from_stroke)
-    notes = start_findings(prepared, first, resumption, options.send.at)
-    dry_runs = list(prepared.dry_runs)
-    dry_runs[first - 1] = what_is_sent(prepared, first, resumption)
+    dry_runs, notes = list[SheetPreview](), list[Finding]()
+    for number, resumption in _starts(prepared, sheets, options):
+        at = None if dry_runs else options.send.at
+        notes += start_findings(prepared, number, resumption, at)
+        dry_runs.append(what_is_sent(prepared, number, resumption))
     prepared = replace(prepared, dry_runs=tuple(dry_runs))
     send, machine = options.send, prepared.machine
     ready = readiness(prepared.findings, send.force) == "ready" and all(
         readiness(each.findings, send.force | passed_checks(send, machine, each.program)) == "ready"
         for each in prepared.dry_runs
     )
-    return prepared, "ready" if ready else "refused", notes
+    return prepared, "ready" if ready else "refused", tuple(notes)
 
 
 def can_go_on(prepared: Prepared) -> bool:

@@ -11,6 +11,7 @@ from miurafab.machine.planning import SendOptions
 from miurafab.workflow.cut import prepare
 from miurafab.workflow.cut_options import CutOptions
 from miurafab.workflow.cut_sheets import cut_prepared, frame
+from miurafab.workflow.sheet_plans import rehearsed
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +80,21 @@ def test_only_what_was_interrupted_or_never_begun_is_resumed(folder):
     journal = folder / "sheet-02.journal"
     journal.write_text(journal.read_text().partition('{"taken"')[0])
     options = CutOptions(send=SendOptions(at=(0.0, 0.0)), resume=True)
+    seen, status, notes = rehearsed(prepared, None, options)
     done = cut_prepared(prepared, port="virtual", options=options)
+    assert [(each.name, each.cut_mm) for each in seen.dry_runs] == [
+        (each.name, each.cut_mm) for each in done
+    ]
+    assert (status, notes) == ("ready", done[0].findings)
     assert [sheet.name for sheet in done] == ["sheet-02", "sheet-03"]
     assert [finding.code for finding in done[0].findings] == ["resumed"]
     assert done[1].findings == ()
     with pytest.raises(InputError, match="was interrupted"):
         cut_prepared(prepared, port="virtual", options=options)
+    with pytest.raises(InputError, match="was interrupted"):
+        rehearsed(prepared, None, options)
+    seen, _, _ = rehearsed(prepared, [3], CutOptions())
+    assert [each.name for each in seen.dry_runs] == ["sheet-03"]
 
 
 def test_what_the_material_does_not_take_is_found(folder):
