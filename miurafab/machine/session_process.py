@@ -212,12 +212,15 @@ class SessionProcess:
     def _be_suspended(self, wished: Suspension) -> None:
         """Have what burns held, and say that this program will be silent (Ctrl-Z).
 
-        A machine whose beam may stay on in a hold is stopped: nobody would look at it.
+        A machine whose beam may stay on in a hold is stopped, and what a person's line burns is
+        ended: nobody would look at it.
         """
         if self._burns and obeys_overrides(self._machine.dialect):
             self.press(" ")
         elif self._burns:
             self.stop()
+        elif self.state is not None and self.state.beam_on:  # by a person's line
+            self.press("q")
         self._tell(SUSPENDED)
         self._beat_at = 0.0
         wished.told(self)

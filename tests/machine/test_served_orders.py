@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -140,6 +141,22 @@ def test_a_suspended_program_holds_what_burns_or_stops_it(
     assert [each for each in told if each in (what, SUSPENDED, "suspended")] == [
         *(what, SUSPENDED, "suspended")
     ]
+
+
+@pytest.mark.parametrize("lit", [True, False])
+def test_what_a_line_of_a_person_burns_is_ended_where_the_program_is_suspended(
+    deaf: None, monkeypatch: pytest.MonkeyPatch, lit: bool
+) -> None:
+    """The watchdog waits for no beat meanwhile: a beam at rest would burn for as long."""
+    signals, told = suspending_signals(), []
+    monkeypatch.setattr(signals.suspension, "_here", lambda: told.append("suspended"))
+    process = SessionProcess(MACHINE, "virtual", signals)
+    process.state = replace(opened(Parent()).open(), beam_on=lit)
+    monkeypatch.setattr(process, "_tell", told.append)
+    signals.suspension.wish()
+    process.poll()
+    process.end()
+    assert told == [b"q"] * lit + [SUSPENDED, "suspended"]
 
 
 @pytest.mark.parametrize("last", ["told", "ended", "begun"])
