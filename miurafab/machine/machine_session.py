@@ -391,7 +391,7 @@ class MachineSession:
         try:
             yield
         except BaseException:
-            if risky or (self.known.opened and self.state.beam_on):
+            if risky or self.known.opened:
                 self._note(self.conversation.status)  # it may not have begun
             raise
         finally:

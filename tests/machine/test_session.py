@@ -31,6 +31,7 @@ from miurafab.machine.keys import JOG_CANCEL
 from miurafab.machine.known_controller import Burnt, PortSetup
 from miurafab.machine.machine_session import MachineSession
 from miurafab.machine.owner import Owner, claim, holder_of, owner_of, this_owner
+from miurafab.machine.progress import Progress
 from miurafab.machine.resume import Resumption
 from miurafab.machine.signals import StopSignals
 from miurafab.simulate.beam import standing_seconds
@@ -484,6 +485,21 @@ def test_no_machine_turns_a_sheet_over_by_itself() -> None:
             with pytest.raises(PersonNeeded, match=rf"{which}.* by its three holes and say so"):
                 here.cut(replace(front, machine=machine))
     assert here.cut(replace(front, machine=fed, back=None)).lines == 15
+
+
+def test_a_stop_that_a_job_did_not_get_through_is_sent_again_at_the_close() -> None:
+    def fail(now: Progress) -> None:
+        if now.line > 3:
+            raise RuntimeError
+
+    here, wire = session()
+    here.open()
+    wire.lose_resets = 3
+    with pytest.raises(RuntimeError):
+        here.cut(JOB, on_progress=fail)
+    assert (wire.sent.count(b"\x18"), wire.lose_resets) == (3, 0)
+    assert here.close()
+    assert wire.sent.count(b"\x18") == 4
 
 
 def test_a_key_acts_again_behind_a_job() -> None:
