@@ -38,6 +38,7 @@ from miurafab.origami.formats.fold import read_fold
 from miurafab.workflow.fold import fold
 from miurafab.workflow.fold_gif import picture
 from miurafab.workflow.panels import thickness_report
+from miurafab.workflow.patterns import consistent_pattern
 
 DATA = Path(__file__).parent.parent / "data"
 
@@ -79,6 +80,22 @@ def test_frames_of_a_wish_are_named_by_their_part_of_it(tmp_path: Path) -> None:
     folding = fold(replace(bare, edges_fold_angle=angles), 4)
     folding.save(tmp_path / "wish.html")
     assert "75% of the fold angles" in (tmp_path / "wish.html").read_text()
+
+
+@pytest.mark.parametrize("folded_flat", [False, True])
+def test_the_motion_of_a_drawing_is_read_again(tmp_path: Path, folded_flat: bool) -> None:
+    """Its first frame, which lies flat, passed for the folded form, and `check` refused that."""
+    sheet = regular(3, 3)
+    wish = np.pi * np.sign(sheet.edges_fold_angle) if folded_flat else sheet.edges_fold_angle
+    drawing = replace(sheet, folded_coords=None, edges_fold_angle=wish)
+    folding = fold(drawing, 4)
+    folding.save(tmp_path / "motion.fold")
+    again = consistent_pattern(tmp_path / "motion.fold")
+    assert again.edges_fold_angle == pytest.approx(wish)
+    if folded_flat:  # a state in which facets lie on each other is no folded form
+        assert again.folded_coords is None
+    else:
+        assert again.folded_coords == pytest.approx(folding.motion.frames[1], abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["plane", "hypar", "sphere", "saddle", "cylinder"])

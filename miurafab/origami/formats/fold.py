@@ -236,7 +236,7 @@ def parse_fold(document: Any) -> CreasePattern:
         edges_assignment=assignment,
         edges_fold_angle=fold_angles_in(key, assignment),
         faces_vertices=faces,
-        folded_coords=folded_form(others, len(flat), factor, origin_of(document)),
+        folded_coords=folded_form(others, key, len(flat), factor, origin_of(document)),
         grid=_grid(document, len(flat)),
         pieces=_pieces(document, faces),
         seams=numbers_at(document, "miurafab:seams", 2),
@@ -254,7 +254,7 @@ def parse_fold(document: Any) -> CreasePattern:
     if pattern.unfolded is not None and not is_unfolded(pattern):
         pattern = replace(pattern, unfolded=None, told=())
     if pattern.folded_coords is not None:
-        chosen = folded_frame(others)
+        chosen = folded_frame(others, key)
         assert chosen is not None
         pattern = with_its_rounding(
             with_its_own_form(pattern) if foreign else pattern,

@@ -1,7 +1,8 @@
 """The frames of a FOLD document: which is the flat pattern, which its folded form, and the others.
 
 A frame of class foldedForm that orders its facets, with folds of 0 and 180 degrees alone, is folded
-flat. It is another state of the sheet, as the frames of a motion are.
+flat. It is another state of the sheet, as the frames of a motion are, which have other fold angles
+than the flat pattern gives.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ from miurafab.origami.formats.fold_keys import (
 from miurafab.origami.formats.folded_only import is_folded
 from miurafab.origami.formats.target_frame import relative, scale_in, target_in
 from miurafab.surfaces.frame import origin_in
+
+_SAME_ANGLE = 1e-4
+"""Degrees by which fold angles may differ as they are written."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +81,16 @@ def folded_alone(frames: list[Mapping[str, Any]]) -> Mapping[str, Any] | None:
 
 
 def folded_form(
-    frames: list[Mapping[str, Any]], vertices: int, factor: float, origin: Floats
+    frames: list[Mapping[str, Any]],
+    key: Mapping[str, Any],
+    vertices: int,
+    factor: float,
+    origin: Floats,
 ) -> Floats | None:
-    """The folded form (V, 3), mm, in ``frames``, relative to ``origin``; None without one."""
-    frame = folded_frame(frames)
+    """The folded form (V, 3), mm, in ``frames`` beside the ``key`` frame, relative to ``origin``;
+    None without one.
+    """
+    frame = folded_frame(frames, key)
     return None if frame is None else _points_of(frame, vertices, factor, origin)
 
 
@@ -94,7 +104,7 @@ def further_frames(document: Mapping[str, Any]) -> tuple[FurtherFrame, ...]:
     place, key = flat_frame(frames)
     flat = points_at(key, "vertices_coords")
     factor, origin = unit_mm(key, 1.0), origin_of(document)
-    chosen = folded_frame(frames[:place] + frames[place + 1 :])
+    chosen = folded_frame(frames[:place] + frames[place + 1 :], key)
     return tuple(
         FurtherFrame(n, _points_of(frame, len(flat), factor, origin), _orders(frame, flat))
         for n, frame in enumerate(frames)
@@ -127,14 +137,32 @@ def _turn(corners: Floats) -> int:
     return 1 if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0 else -1
 
 
-def folded_frame(frames: list[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+def folded_frame(
+    frames: list[Mapping[str, Any]], key: Mapping[str, Any]
+) -> Mapping[str, Any] | None:
     """The first of ``frames`` of class foldedForm. A frame that says of itself that it is folded
-    flat is another state of the sheet.
+    flat, and one of several that folds by other angles than the ``key`` frame gives, is another
+    state of the sheet.
     """
-    for frame in frames:
-        if "foldedForm" in classes_of(frame) and not _is_folded_flat(frame):
+    folded = [frame for frame in frames if "foldedForm" in classes_of(frame)]
+    for frame in folded:
+        if not _is_folded_flat(frame) and not (len(folded) > 1 and _folds_otherwise(frame, key)):
             return frame
     return None
+
+
+def _folds_otherwise(frame: Mapping[str, Any], key: Mapping[str, Any]) -> bool:
+    """Whether ``frame`` gives an edge another fold angle than the ``key`` frame does."""
+    try:
+        own, given = (
+            np.array([np.nan if a is None else a for a in list_at(each, "edges_foldAngle")], float)
+            for each in (frame, key)
+        )
+    except (PatternError, ValueError, TypeError):  # none, or no angles
+        return False
+    if own.shape != given.shape or not np.nan_to_num(given).any():
+        return False  # that the sheet lies flat in its flat pattern tells nothing of its folds
+    return bool((np.abs(own - given) > _SAME_ANGLE).any())
 
 
 def _points_of(frame: Mapping[str, Any], vertices: int, factor: float, origin: Floats) -> Floats:
