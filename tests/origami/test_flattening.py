@@ -151,7 +151,7 @@ def test_a_ring_is_opened_and_that_is_told() -> None:
 
 
 def test_a_state_with_an_order_of_layers_and_no_class_is_a_folded_form() -> None:
-    """Of ten such states of Line Folder, `check` said that facets lie turned over."""
+    """Of eight such states of Line Folder, `check` said that facets lie turned over."""
     corners = [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [0.5, 1]]
     state = {
         "vertices_coords": [[min(x, 1 - x), y] for x, y in corners],
