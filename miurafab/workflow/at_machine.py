@@ -32,6 +32,7 @@ _DONE = {
     "unlock": "Unlocked.",
     "set_origin": "The origin is where the head stands.",
     "frame": "The frame was traced.",
+    "load": "The sheet is in.",
 }
 
 
@@ -188,10 +189,7 @@ class Operator:
         """Somebody has put in fresh material, or turned the sheet over; raises ``InputError`` while
         an action is under way, which would burn on it.
         """
-        self.armed = False
-        self._require_idle()
-        self._process.order("load")
-        self.said.append("The sheet is in.")
+        self.do("load")
 
     # The sheets
 

@@ -14,7 +14,7 @@ import pytest
 from command_line import sentence
 
 from miurafab.cli.session_screen import HELP, SessionScreen
-from miurafab.errors import JobStopped, MiurafabError
+from miurafab.errors import ControllerError, JobStopped, MiurafabError
 from miurafab.machine import session_process
 from miurafab.machine.keys import DOWN, LEFT, PAGE_DOWN, PAGE_UP, RIGHT, UP
 from miurafab.machine.known_controller import PortSetup
@@ -137,6 +137,17 @@ def test_a_sheet_is_chosen_framed_and_burnt_by_words(words):
     assert "line.nc is done: 5 lines in 0:0" in done.stdout
     burnt = InThread.made.device.beam_log
     assert sum(each.x1 - each.x0 for each in burnt) == pytest.approx(10, abs=0.1)
+
+
+def test_a_sheet_is_said_to_be_in_when_the_machine_has_taken_it(words, monkeypatch):
+    def refused(session):
+        raise ControllerError("A program was running when the lid was opened.")
+
+    monkeypatch.setattr(MachineSession, "load", refused)
+    done = words("fresh\nstart\n", "virtual", "line.nc")
+    assert "A program was running when the lid was opened." in sentence(done, 3)
+    assert "The sheet is in." not in done.stdout
+    assert "cut" not in InThread.made.asked
 
 
 @pytest.mark.parametrize(

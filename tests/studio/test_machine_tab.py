@@ -89,7 +89,7 @@ def test_a_sheet_is_armed_started_changed_and_nothing_burns_by_one_step(tmp_path
         assert bench.device.beam_log[0].x0 >= 10.0
         assert "put in fresh material" in sentence(at.ask("arm"))
         at.ok("do", action="fresh")
-        at.until(loaded=False)
+        at.until(loaded=False, busy="")
         at.start()
         at.until(loaded=True, busy="")
         kept = Path(at.seen()["job"]["folder"])
