@@ -88,6 +88,12 @@ class GrblDriver(StreamDriver):
         """See :class:`StreamDriver`."""
         return self._streamer.last.number if self._streamer.last else 0
 
+    @property
+    def stands(self) -> bool:
+        """See :class:`StreamDriver`: held, at a pause of the program, or stopped at the machine."""
+        report = self._session.status
+        return self.held or (report is not None and report.state in _STOPPED)
+
     # The steps
 
     def prepare(self) -> tuple[Finding, ...]:

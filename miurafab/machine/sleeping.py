@@ -2,7 +2,8 @@
 
 A controller under M4 goes dark when it has made what it holds, and takes the rest of the job
 whenever that comes. The clock of the waits stands still in a sleep on Linux and macOS, so that
-nothing there would tell of it.
+nothing there would tell of it. Neither clock here is ever set, as the wall clock is: a board
+without a battery sets that by hours when it reaches its network.
 """
 
 from __future__ import annotations
@@ -10,23 +11,55 @@ from __future__ import annotations
 import sys
 import time
 
+SLEPT_S = 1.0
+"""A shorter sleep is over before the controller has made what it holds."""
+_TORN_S = 0.1
+
 
 def slept_s() -> float:
     """The seconds that this computer has slept, from an arbitrary number on.
 
-    Sources: clock_gettime(2) of Linux (``CLOCK_BOOTTIME``) and of macOS (``CLOCK_MONOTONIC`` goes
-    on in a sleep, Python's does not); ``QueryUnbiasedInterruptTime`` and ``GetTickCount64`` of
-    Windows.
+    A process that stood still between two clocks (Ctrl-Z, a busy computer) reads them again.
+    Sources: clock_gettime(2) of Linux (``CLOCK_BOOTTIME``), clock_gettime(3) of macOS;
+    ``QueryUnbiasedInterruptTime`` and ``GetTickCount64`` of Windows.
 
     >>> -1.0 < slept_s() - slept_s() < 1.0
     True
     """
-    if sys.platform == "win32":
-        import ctypes
+    while True:
+        began = _awake_s()
+        slept = _passed_s() - began
+        if _awake_s() - began < _TORN_S:
+            return slept
 
-        kernel, awake = ctypes.windll.kernel32, ctypes.c_ulonglong()
-        kernel.QueryUnbiasedInterruptTime(ctypes.byref(awake))
-        kernel.GetTickCount64.restype = ctypes.c_ulonglong
-        return float(kernel.GetTickCount64() / 1e3 - awake.value / 1e7)
-    clock = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
-    return time.clock_gettime(clock) - time.monotonic()
+
+if sys.platform == "win32":
+    import ctypes
+
+    _kernel = ctypes.WinDLL("kernel32")
+    _kernel.GetTickCount64.restype = ctypes.c_ulonglong
+
+    def _awake_s() -> float:
+        awake = ctypes.c_ulonglong()
+        _kernel.QueryUnbiasedInterruptTime(ctypes.byref(awake))
+        return awake.value / 1e7
+
+    def _passed_s() -> float:
+        return float(_kernel.GetTickCount64() / 1e3)
+
+elif sys.platform == "darwin":
+
+    def _awake_s() -> float:
+        return time.clock_gettime(time.CLOCK_UPTIME_RAW)
+
+    def _passed_s() -> float:
+        return time.clock_gettime(time.CLOCK_MONOTONIC_RAW)
+
+else:
+    _PASSED = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+
+    def _awake_s() -> float:
+        return time.monotonic()
+
+    def _passed_s() -> float:
+        return time.clock_gettime(_PASSED)

@@ -23,11 +23,10 @@ from miurafab.machine.known_controller import KnownController
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import AS_WRITTEN, JobAborted, Overrides, Progress, StreamResult
 from miurafab.machine.session import Session
-from miurafab.machine.sleeping import slept_s
+from miurafab.machine.sleeping import SLEPT_S, slept_s
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
 
-_SLEPT_S = 1.0  # a shorter sleep is over before the controller has made what it holds
 _TELL_S = 0.2  # between two progress reports for a machine that does not report its position
 
 
@@ -111,6 +110,11 @@ class StreamDriver(ABC):
         """The state of the machine in one word, as far as the driver knows it."""
         return "Hold" if self.held else "Run"
 
+    @property
+    def stands(self) -> bool:
+        """Whether the machine stands until a person lets it go on, as far as the driver knows."""
+        return self.held
+
     def obey(self) -> None:
         """Carry out ``orders``. A machine without feed hold is paused by sending nothing more."""
         for order in self.orders:
@@ -159,7 +163,7 @@ class StreamDriver(ABC):
     def _watch_for_sleep(self) -> None:
         before, self._slept = self._slept, slept_s()
         slept = self._slept - before
-        if slept > _SLEPT_S and self._context.transport.blocks and not self.held:
+        if slept > SLEPT_S and self._context.transport.blocks and not self.stands:
             raise MachineError(
                 f"The computer slept for {slept:.0f} s while it sent {self.plan.job.name}, and "
                 "nobody may have watched the machine since"

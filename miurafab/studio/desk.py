@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 from miurafab.errors import InputError
 from miurafab.machine.known_controller import MachineState, require_talk
 from miurafab.machine.owner import owner_of
+from miurafab.machine.sleeping import slept_s
 from miurafab.machine.transport import VIRTUAL, require_port
 from miurafab.profiles import MachineProfile, load_machine
 from miurafab.profiles.own import own_defaults
@@ -72,14 +73,13 @@ class ArmedSheet(NamedTuple):
 class Desk:
     """The session and who controls it. Every method may be called in any thread.
 
-    ``speed`` is that of the practice machine; ``wall`` a clock that goes on while the computer
-    sleeps.
+    ``speed`` is that of the practice machine; ``asleep`` tells how long the computer has slept.
     """
 
     def __init__(
-        self, *, speed: float = PRACTICE_SPEED, wall: Callable[[], float] = time.time
+        self, *, speed: float = PRACTICE_SPEED, asleep: Callable[[], float] = slept_s
     ) -> None:
-        self._speed, self._wall = speed, wall
+        self._speed, self._asleep = speed, asleep
         self._lock = threading.Lock()
         self._session: HeldSession | None = None
         self._control: str | None = None
@@ -135,7 +135,7 @@ class Desk:
                 on_look=self._look,
                 on_end=self._end,
                 speed=self._speed if port == VIRTUAL else None,
-                wall=self._wall,
+                asleep=self._asleep,
             )
             return self._take()
 

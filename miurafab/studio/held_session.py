@@ -23,6 +23,7 @@ from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.machine.keys import RESET
 from miurafab.machine.session_process import Message, SessionProcess
 from miurafab.machine.signals import StopSignals
+from miurafab.machine.sleeping import SLEPT_S, slept_s
 from miurafab.profiles import MachineProfile
 from miurafab.studio.machine_words import ENDED, FAILED, NO_ANSWER, OVER, VOID, slept
 from miurafab.workflow.at_machine import Operator
@@ -31,7 +32,6 @@ from miurafab.workflow.cut_options import DEFAULT_OPTIONS
 T = TypeVar("T")
 
 _ANSWER_S = 20.0  # for the thread; the plan of a sheet of a million lines takes 3 s
-_SLEPT_S = 5.0  # the wall clock runs ahead by more: the computer slept
 _LOOK_S = 0.05  # between two looks at a state that no message has changed
 _RESET_KEY = RESET.decode("ascii")
 
@@ -82,8 +82,8 @@ class HeldSession:
 
     ``on_look`` is called by that thread with the operator after each message, and a few times a
     second; ``on_end`` with how the session ended, in a sentence, empty where it was asked to.
-    ``wall`` is a clock that goes on while the computer sleeps. ``trouble`` is what ended the last
-    action, if it failed.
+    ``asleep`` tells how long the computer has slept. ``trouble`` is what ended the last action, if
+    it failed.
     """
 
     def __init__(
@@ -94,13 +94,13 @@ class HeldSession:
         on_look: Callable[[Operator], None],
         on_end: Callable[[str], None],
         speed: float | None = None,
-        wall: Callable[[], float] = time.time,
+        asleep: Callable[[], float] = slept_s,
     ) -> None:
         self.machine, self.port = machine, port
         self.process = DeskProcess(machine, port, speed)
         self.trouble = ""
         self._failure: MiurafabError | None = None
-        self._on_look, self._on_end, self._wall = on_look, on_end, wall
+        self._on_look, self._on_end, self._asleep = on_look, on_end, asleep
         self._asked: queue.SimpleQueue[tuple[int, Callable[[Operator], Any], Future[Any]]] = (
             queue.SimpleQueue()
         )
@@ -155,13 +155,13 @@ class HeldSession:
 
     def _follow(self, operator: Operator) -> None:
         look_at = 0.0
-        wall, steady = self._wall(), time.monotonic()
+        asleep = self._asleep()
         while not operator.over and not self._leaves.is_set():
             came = operator.take()
-            before = wall - steady
-            wall, steady = self._wall(), time.monotonic()
-            if wall - steady - before > _SLEPT_S:
-                self._wake(operator, wall - steady - before)
+            before, asleep, steady = asleep, self._asleep(), time.monotonic()
+            if asleep - before > SLEPT_S:
+                operator.said.append(slept(asleep - before, armed=operator.armed))
+                operator.armed = False
             came = self._carry_out(operator) or came
             while operator.failures:
                 self._failure = operator.failures.popleft()
@@ -204,15 +204,6 @@ class HeldSession:
             except queue.Empty:
                 return
             future.set_exception(MachineError(OVER))
-
-    def _wake(self, operator: Operator, seconds: float) -> None:
-        """A job that the computer slept through has stood still unwatched: it is not gone on
-        with, and none that was armed before is started.
-        """
-        operator.armed = False
-        operator.said.append(slept(seconds, stopped=operator.busy == "cut"))
-        if operator.busy == "cut":
-            self.process.reset()
 
     def _why_over(self, operator: Operator) -> str:
         """Why it ended without being asked to; empty if it was asked."""

@@ -152,14 +152,9 @@ def _alarm_advice(alarm: int | None, homes: bool) -> str:
     )
 
 
-def slept(seconds: float, *, stopped: bool) -> str:
-    """What is said after the computer slept, or its clock was set."""
-    tail = (
-        " The sheet was aborted: nobody may have watched it. Look at it, and at the machine."
-        if stopped
-        else ""
-    )
-    return f"This computer slept, or its clock was set, by {seconds:.0f} s.{tail}"
+def slept(seconds: float, *, armed: bool) -> str:
+    """What is said after the computer slept, with a sheet that was ``armed`` before."""
+    return f"This computer slept for {seconds:.0f} s.{' Arm the sheet anew.' * armed}"
 
 
 _LABELS = {

@@ -775,3 +775,18 @@ def test_a_pause_is_known_on_a_machine_of_few_steps() -> None:
     job = Job("paused.nc", "M4 S0\nG1 X20.2 Y7.3 S500 F600\nM0\nG1 X30\nM5\n")
     deliver(replace(plan_job(job, MACHINE), at_pause="go on"), wire, StopSignals())
     assert wire.commands.count(b"~") == 1
+
+
+@pytest.mark.parametrize("stop", ["M0", b"\x84"])
+def test_a_sleep_while_the_machine_stands_for_a_person_ends_no_job(
+    monkeypatch: pytest.MonkeyPatch, stop: str | bytes
+) -> None:
+    """At a pause of the program, or behind a lid that was opened."""
+    wire = new_wire()
+    wire.blocks = True
+    monkeypatch.setattr("miurafab.machine.stream_driver.slept_s", lambda: 600 * (wire.now() > 4.0))
+    pause = f"{stop}\n" if isinstance(stop, str) else ""
+    pressed_at_the_machine(wire, *[(2.0, stop)] * (not pause), (6.0, b"~"))
+    job = Job("slow.nc", f"M4 S0\nG1 X5 S500 F300\n{pause}G1 X20\nM5\n")
+    assert deliver(replace(plan_job(job, MACHINE), at_pause="wait"), wire, StopSignals()).lines
+    assert wire.device.position[0] == pytest.approx(20.0)

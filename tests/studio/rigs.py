@@ -9,6 +9,7 @@ import time
 from benches import Bench
 from studios import Asked, request
 
+from miurafab.machine.sleeping import slept_s
 from miurafab.profiles.own import OwnDefaults, write_defaults
 from miurafab.studio.core import Studio
 from miurafab.studio.desk import Desk
@@ -61,9 +62,9 @@ def until(true, seconds=30.0):
 class AtMachine(Asked):
     """A studio asked without a socket, connected to a machine with a job on it."""
 
-    def __init__(self, folder, job, port, *, wall=time.time):
+    def __init__(self, folder, job, port, *, asleep=slept_s):
         super().__init__(folder)
-        self.desk = Desk(wall=wall)
+        self.desk = Desk(asleep=asleep)
         self.studio = Studio(self.studio.bench, self.studio.guard, desk=self.desk, own_job=job)
         self.control = ""
         self.port = port

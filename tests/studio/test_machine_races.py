@@ -26,9 +26,7 @@ def at(tmp_path, monkeypatch):
     (tmp_path / "bench").mkdir()
     slept = [0.0]
     with Pumped() as bench:
-        studio = AtMachine(
-            tmp_path / "bench", job, bench.wire.address, wall=lambda: time.monotonic() + slept[0]
-        )
+        studio = AtMachine(tmp_path / "bench", job, bench.wire.address, asleep=lambda: slept[0])
         studio.bench, studio.slept = bench, slept
         yield studio
         studio.desk.leave()
@@ -106,6 +104,17 @@ def test_what_was_armed_before_the_computer_slept_is_not_started(at):
     at.slept[0] = 3600.0
     until(lambda: at.seen()["armed"] is None)
     assert sentence(at.ask("start", code=code)).startswith("Nothing is armed")
+
+
+def test_a_sheet_that_was_held_when_the_computer_slept_stays_held(at):
+    at.start()
+    until(lambda: at.bench.device.beam_on)
+    at.ok("key", key="hold")
+    at.until(state="Hold:0")
+    at.slept[0] = 3600.0
+    until(lambda: "This computer slept for 3600 s." in at.seen()["said"])
+    assert b"\x18" not in at.bench.bytes_came
+    at.ok("abort")
 
 
 def test_an_abort_at_the_end_of_a_session_is_no_fault(at):

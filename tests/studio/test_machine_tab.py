@@ -171,19 +171,6 @@ def test_a_machine_that_says_nothing_is_not_shown_as_well(at):
     assert "what stands here is old" in state["words"]["advice"]
 
 
-def test_a_job_that_the_computer_slept_through_is_not_gone_on_with(at):
-    clock = [0.0]
-    at.desk.leave()
-    at.desk = at.studio.desk = Desk(wall=lambda: time.monotonic() + clock[0])
-    at.connect()
-    burning(at)
-    clock[0] = 3600.0
-    until(lambda: b"\x18" in at.bench.bytes_came)
-    state = at.until(busy="", state="Alarm")
-    assert any("slept" in line and "3600 s" in line for line in state["said"])
-    at.stop().assert_dark()
-
-
 def test_the_process_that_holds_the_port_is_killed(at):
     burning(at)
     (holder,) = [pid for pid in children(Itself()) if b"session_process" in command(pid)]
