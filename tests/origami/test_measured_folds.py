@@ -407,7 +407,7 @@ def test_a_facet_that_is_turned_over_is_named() -> None:
 
 
 def test_neighbours_whose_cells_lie_apart_are_named() -> None:
-    pattern = replace(strip(np.zeros(5)), folded_coords=None)
+    pattern = replace(strip(np.zeros(5), 4.0), folded_coords=None)
     column = np.column_stack([np.arange(4), np.zeros(4, dtype=np.int64)])
     inner = np.flatnonzero(pattern.edges_assignment == "F")
     assert said(replace(pattern, cells=column), form=False) == []
@@ -434,7 +434,7 @@ def test_neighbours_whose_cells_lie_apart_are_named() -> None:
 
 def test_two_rings_close_each_on_itself() -> None:
     """Columns run 2 3 0 1 in the one, and 102 103 100 101 in the other."""
-    one = replace(strip(np.zeros(5)), folded_coords=None)
+    one = replace(strip(np.zeros(5), 4.0), folded_coords=None)
     count = len(one.vertices_coords)
     column = np.column_stack([np.roll(np.arange(4), 2), np.zeros(4, dtype=np.int64)])
     both = replace(
