@@ -24,6 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from miurafab.fabrication.recover import RecoveredCorners
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.connected import components
 from miurafab.geometry.polygons import next_corners
 from miurafab.origami.crease_pattern import CreasePattern
 
@@ -58,12 +59,16 @@ def laid_on(source: Floats, target: Floats) -> tuple[Floats, Floats]:
 def _folded(
     pattern: CreasePattern, own: Ints, place: Floats, face_patch: Ints
 ) -> tuple[Ints, Floats]:
-    """The vertices of the facets ``own``, and where they are in the folded piece."""
+    """The vertices of the facets ``own`` that measured edges join, and where they are in the folded
+    piece.
+    """
     a, b, relative = _hinges(pattern, own, place, face_patch)
     turns = _rotations(len(own), a, b, relative)
     faces = pattern.faces_vertices[own]
     heads = np.take_along_axis(faces, next_corners(faces), axis=1)
-    facet, slot = np.nonzero(faces >= 0)
+    part = components(len(own), a, b)
+    joined = part == np.bincount(part).argmax()  # how the others stand to these is not known
+    facet, slot = np.nonzero((faces >= 0) & joined[:, None])
     tail, head = faces[facet, slot], heads[facet, slot]
     chart = place[face_patch[own[facet]]]
     number = np.arange(len(facet))

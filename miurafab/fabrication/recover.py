@@ -15,7 +15,7 @@ import shapely
 
 from miurafab.fabrication.partition.patch_outline import OutlinedPatches
 from miurafab.fabrication.strokes import RigidTransform
-from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 
 NEAR_MM = 0.15
@@ -31,12 +31,14 @@ PARALLEL = 0.05
 @dataclass(frozen=True, eq=False)
 class RecoveredCorners:
     """The K corners of all patches: ``patch`` and ``vertex`` (K,) of each, and its ``place``
-    (K, 2) on the sheet in mm, NaN where the burnt lines do not fix it.
+    (K, 2) on the sheet in mm, NaN where no burnt line leads there. ``fixed`` (K,) tells where the
+    lines are not parallel.
     """
 
     patch: Ints
     vertex: Ints
     place: Floats
+    fixed: Bools
 
 
 def recovered_corners(
@@ -55,8 +57,11 @@ def recovered_corners(
     key = np.repeat(patch, 2) * len(pattern.vertices_coords) + pattern.edges_vertices[edge].ravel()
     corners, corner = np.unique(key, return_inverse=True)
     line = np.repeat(np.arange(len(edge)), 2)
-    place = _meeting(corner.reshape(-1), middle[line], along[line], len(corners))
-    return RecoveredCorners(*np.divmod(corners, len(pattern.vertices_coords)), place)
+    owner, vertex = np.divmod(corners, len(pattern.vertices_coords))
+    meant = np.einsum("nij,nj->ni", motion.matrix[owner], pattern.vertices_coords[vertex])
+    meant += motion.shift[owner]
+    place, fixed = _meeting(corner.reshape(-1), middle[line], along[line], meant)
+    return RecoveredCorners(owner, vertex, place, fixed)
 
 
 def _edges(
@@ -120,16 +125,20 @@ def _lines(placed: Floats, sheet: Ints, burnt: list[Floats]) -> tuple[Floats, Fl
     return mean, np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-def _meeting(corner: Ints, middle: Floats, along: Floats, count: int) -> Floats:
-    """(count, 2) the point nearest to the lines of each corner; NaN where they are parallel."""
+def _meeting(corner: Ints, middle: Floats, along: Floats, meant: Floats) -> tuple[Floats, Bools]:
+    """(n, 2) the point nearest to the lines of each corner, and to where it is ``meant`` (n, 2) to
+    be where they are parallel, and (n,) whether they are not; NaN where there is none.
+    """
     known = np.isfinite(middle).all(axis=1)
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)[known]
-    away = np.einsum("nk,nk->n", normal, middle[known])
-    square = np.zeros((count, 2, 2))
-    side = np.zeros((count, 2))
+    off = np.einsum("nk,nk->n", normal, middle[known] - meant[corner[known]])
+    square = np.zeros((len(meant), 2, 2))
+    side = np.zeros((len(meant), 2))
     np.add.at(square, corner[known], normal[:, :, None] * normal[:, None])
-    np.add.at(side, corner[known], normal * away[:, None])
-    fixed = np.linalg.eigvalsh(square)[:, 0] > PARALLEL**2
-    place = np.full((count, 2), np.nan)
-    place[fixed] = np.linalg.solve(square[fixed], side[fixed][..., None])[..., 0]
-    return place
+    np.add.at(side, corner[known], normal * off[:, None])
+    size, axes = np.linalg.eigh(square)
+    fixed = size[:, 0] > PARALLEL**2
+    size[size <= PARALLEL**2] = np.inf
+    place = meant + np.einsum("nij,nj,nkj,nk->ni", axes, 1 / size, axes, side)
+    place[np.isinf(size).all(axis=1)] = np.nan
+    return place, fixed

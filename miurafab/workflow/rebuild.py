@@ -127,7 +127,9 @@ def rebuild(directory: AnyPath) -> Rebuilt:
         sheets.append(np.concatenate(parts))
     corners = recovered_corners(pattern, outlined, motion, kerf, sheets)
     shell = glued_shell(pattern, outlined.face_patch, corners)
-    known = np.isfinite(shell).all(axis=1)
+    known = np.zeros(len(shell), dtype=bool)
+    known[corners.vertex[corners.fixed]] = True
+    known &= np.isfinite(shell).all(axis=1)
     if known.sum() < 3:
         raise InputError(f"{folder}: what was burnt does not fix the corners of the pattern.")
     turn, shift = laid_on(shell[known], pattern.folded_coords[known])

@@ -66,6 +66,34 @@ def test_what_burnt_lines_do_not_fix_is_left_out(tmp_path):
     assert 0 < found.target_mm < 0.01
 
 
+def slit(letters: str) -> CreasePattern:
+    """Two squares on a crease folded by 60 degrees, one of them with a slit that goes on flat."""
+    flat = [[0, 0], [40, 0], [80, 0], [80, 40], [40, 40], [0, 40], [0, 20], [20, 20], [40, 20]]
+    sides = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 6], [6, 0], [6, 7], [7, 8], [8, 4], [1, 8]]
+    points, turn = np.array(flat, dtype=np.float64), np.radians(60)
+    out = np.maximum(points[:, 0] - 40, 0)
+    x = points[:, 0] - out * (1 - np.cos(turn))
+    return CreasePattern(
+        vertices_coords=points,
+        edges_vertices=np.array(sides),
+        edges_assignment=np.array(list("BBBBBBB" + letters)),
+        edges_fold_angle=np.where(np.array(list("BBBBBBB" + letters)) == "V", turn, 0.0),
+        faces_vertices=np.array([[0, 1, 8, 7, 6], [6, 7, 8, 4, 5], [1, 2, 3, 4, 8]]),
+        folded_coords=np.column_stack([x, points[:, 1], out * np.sin(turn)]),
+    )
+
+
+@pytest.mark.parametrize(("letters", "measured"), [("CFVV", 7), ("CCVV", 8)])
+def test_facets_beside_a_slit_stand_as_they_are_burnt(letters, measured, tmp_path):
+    """Lines are parallel at its end, and where the flat edge meets the crease: both facets there
+    were glued to nothing, 14 mm from their place.
+    """
+    mf.sheets(slit(letters)).write(tmp_path)
+    found = mf.rebuild(tmp_path)
+    assert (found.corners, found.measured) == (9, measured)
+    assert found.worst_mm < 0.05
+
+
 def test_a_crease_burnt_beside_its_place_is_seen_in_the_shell(tmp_path):
     mf.sheets(regular(5, 5)).write(tmp_path)
     file = tmp_path / "sheet-01.nc"
@@ -227,7 +255,18 @@ def test_exact_corners_glue_to_the_exact_shell():
         patch += [number] * len(own)
         vertex += own.tolist()
         place += (pattern.vertices_coords[own] @ [[c, s], [-s, c]] + 7 * number).tolist()
-    corners = RecoveredCorners(np.array(patch), np.array(vertex), np.array(place))
+    fixed = np.ones(len(patch), dtype=bool)
+    corners = RecoveredCorners(np.array(patch), np.array(vertex), np.array(place), fixed)
     shell = glued_shell(pattern, face_patch, corners)
     turn, shift = laid_on(shell, pattern.folded_coords)
     np.testing.assert_allclose(shell @ turn.T + shift, pattern.folded_coords, atol=1e-7)
+
+
+def test_facets_that_no_measured_edge_joins_are_left_out():
+    pattern = slit("CFVV")
+    place = pattern.vertices_coords.copy()
+    place[[7, 8]] = np.nan  # every crease and flat edge ends there
+    none = np.zeros(len(place), dtype=np.int64)
+    corners = RecoveredCorners(none, np.arange(len(place)), place, np.isfinite(place[:, 0]))
+    shell = glued_shell(pattern, none[:3], corners)
+    assert np.flatnonzero(np.isfinite(shell).all(axis=1)).tolist() == [0, 1, 6]
