@@ -23,7 +23,7 @@ from miurafab.grbl.states import State
 from miurafab.machine.keys import OVERRIDES_OFF, obeys_overrides
 from miurafab.machine.modes import SET, TOOL_LENGTH, ControllerModes
 from miurafab.machine.progress import AS_WRITTEN, Overrides
-from miurafab.machine.session import Session
+from miurafab.machine.session import HOMING_S, Session
 from miurafab.profiles import MachineProfile
 from miurafab.profiles.machine import WAIT_S
 
@@ -238,21 +238,28 @@ class KnownController:
 
     def unlock(self) -> None:
         """Unlock it, and wait for the end of what it may run behind that, which may change modes
-        and offsets, and arm the beam.
+        and offsets; a beam that this lights goes out at once.
         """
         self._session.command("$X")
         if runs_unseen(self._dialect):
             self.may_differ()
+            self._session.command(MODES, HOMING_S)  # answered when that is over
+            self._put_out()
             self.refresh()
 
     def home(self, heed: Callable[[], None] = lambda: None) -> None:
         """See :meth:`Session.home`. The startup blocks that run behind it may change modes and
-        offsets, and arm the beam.
+        offsets; a beam that they light goes out at once.
         """
         try:
             self._session.home(heed)
+            self._put_out()
         finally:
             self.may_differ()
+
+    def _put_out(self) -> None:
+        if not self._session.wait_status().beam_off:
+            self._session.command("M5")
 
     # What a job needs
 

@@ -180,7 +180,7 @@ class MachineSession:
     def unlock(self) -> MachineState:
         """Unlock the controller after an alarm (``$X``); its position must still be right."""
         self.open()
-        self.known.unlock()
+        self._or_stop(self.known.unlock)
         return self.look()
 
     def home(self) -> MachineState:

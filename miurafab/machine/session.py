@@ -278,7 +278,7 @@ class Session:
     def home(self, heed: Callable[[], None] = lambda: None) -> None:
         """Run the homing cycle and wait for its end; raises as :meth:`command` does.
 
-        Startup blocks run then, and a beam that they light goes out at once.
+        Startup blocks run then.
         ``heed`` is called before every read meanwhile, as ``check`` is, and may raise.
         """
         check = self._check
@@ -292,8 +292,6 @@ class Session:
             self.command(HOME, HOMING_S)
         finally:
             self._check = check
-        if not self.wait_status().beam_off:
-            self.command("M5")
 
     def _require_ready(self, text: str) -> None:
         if self.connection.may_send(SendLine(0, text.encode("ascii"))):

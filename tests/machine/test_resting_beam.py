@@ -525,7 +525,7 @@ def test_a_move_goes_on_after_no_job_that_could_not_begin(tmp_path: Path) -> Non
 class Macros(FakeWire):
     """FluidNC that runs a macro of two lines behind each reset and each ``$X``."""
 
-    unlocks, unanswered = False, 0
+    unlocks, unanswered, dwell = False, 0, b"0.3"
 
     def write(self, data: bytes) -> None:
         self.unlocks = self.unlocks or data == b"$X\n"
@@ -537,7 +537,7 @@ class Macros(FakeWire):
             self.unanswered -= 1
             said = said.replace(b"ok\r\n", b"", 1)
         elif b"Grbl" in said or (self.unlocks and b"ok" in said):
-            self.device.receive(b"G4P0.3\nG1F100M3S500\n")
+            self.device.receive(b"G4P" + self.dwell + b"\nG1F100M3S500\n")
             self.unlocks, self.unanswered = False, 2
         return said
 
@@ -547,12 +547,35 @@ def with_macros() -> Macros:
     return Macros(VirtualGrbl(virtual_settings(machine), baud=115_200, dialect="fluidnc"))
 
 
-def test_what_a_macro_of_fluidnc_lights_behind_an_unlocking_is_put_out_at_the_close() -> None:
+@pytest.mark.parametrize("dwell", [b"0.3", b"5"])
+def test_what_a_macro_of_fluidnc_lights_behind_an_unlocking_is_put_out(dwell: bytes) -> None:
+    """However long it takes; a reset, which runs the other macro, is not needed."""
     wire = with_macros()
     session = MachineSession(wire, StopSignals(), PortSetup("fluidnc"))
-    assert session.unlock().beam_on
+    session.open()
+    wire.dwell = dwell
+    assert session.unlock().beam_off
     assert session.close()
-    wire.device.advance(5.0)
+    wire.device.advance(9.0)
+    assert not wire.device.beam_on
+    assert b"\x18" not in wire.commands
+
+
+def test_a_signal_while_a_macro_runs_behind_an_unlocking_resets() -> None:
+    wire, signals = with_macros(), StopSignals()
+    session = MachineSession(wire, signals, PortSetup("fluidnc"))
+    assert session.command("M5").beam_off
+
+    def press(call: int) -> None:
+        if b"$X" in wire.commands and signals.caught is None:
+            signals.caught = "SIGINT"
+
+    wire.before_call = press
+    with pytest.raises(KeyboardInterrupt):
+        session.unlock()
+    session.close()
+    wire.device.advance(9.0)
+    assert b"\x18" in wire.commands
     assert not wire.device.beam_on
 
 
