@@ -3,7 +3,7 @@
 Facets that touch at a vertex alone are parted there, since nothing holds them. Two corners of
 facets are one vertex if facets around it join them across edges that are not cut. Facets and edges
 keep their numbers. One fan of facets keeps the vertex, and the left side of a cut keeps the edge;
-what is new comes behind.
+what is new comes behind. A cut whose two ends both stay one vertex stays one edge, of letter C.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from miurafab.origami.crease_pattern import CreasePattern
 
 
 def cut_open(pattern: CreasePattern) -> CreasePattern:
-    """``pattern`` with its inner cuts as borders, parted where it touches at a vertex alone; the
-    pattern itself if there is neither.
+    """``pattern`` with its inner cuts as borders where they part, parted where it touches at a
+    vertex alone; the pattern itself if there is neither.
 
     Edges of letter B or C with a facet on both sides are cuts.
     """
@@ -43,12 +43,14 @@ def cut_open(pattern: CreasePattern) -> CreasePattern:
         return pattern
     own = np.where(corners[:, :1, 0] >= 0, corners[:, 0], corners[:, 1])
     edges = np.where(own >= 0, vertex[own], pattern.edges_vertices)
-    other = vertex[corners[cut, 1]]
+    across = np.where(corners[:, :1, 1] >= 0, corners[:, 1], corners[:, 0])
+    parted = cut & (vertex[across] != edges).any(axis=1)
+    other = vertex[corners[parted, 1]]
     source = np.arange(max(int(vertex.max()) + 1, len(pattern.vertices_coords)))
     source[vertex[start]] = faces[face, slot]
     opened = np.where(faces >= 0, vertex.reshape(faces.shape), -1)
     parts, piece = connected_parts(opened)
-    letter = np.where(cut, "B", pattern.edges_assignment)
+    letter = np.select([parted, cut], ["B", "C"], pattern.edges_assignment)
     angle = np.where(cut, 0.0, pattern.edges_fold_angle)
     folded = pattern.folded_coords
     return replace(
@@ -61,7 +63,7 @@ def cut_open(pattern: CreasePattern) -> CreasePattern:
         folded_coords=None if folded is None else folded[source],
         grid=None,
         pieces=piece if parts > 1 else None,
-        told=(*pattern.told, *told),
+        told=(*pattern.told, *(each for each in told if each not in pattern.told)),
     )
 
 

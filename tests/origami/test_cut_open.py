@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import named_patterns
 import numpy as np
 import pytest
 
 from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.cut_open import cut_open
+from miurafab.origami.energy.bar_hinge import sheet_model
 from miurafab.origami.folding.motion import find_motion
 
 
@@ -27,7 +30,13 @@ def test_the_two_sides_of_a_cut_part() -> None:
     assert len(opened.faces_vertices) == len(pattern.faces_vertices) == 6
     # both ends of the slit lie inside the sheet, so facets around them still join them
     assert len(opened.vertices_coords) == len(pattern.vertices_coords)
-    assert len(opened.edges_vertices) == edges + 1
+    # and its two sides are one edge, which was there twice, once as a side of no facet
+    assert len(opened.edges_vertices) == edges
+    assert (opened.edges_assignment == pattern.edges_assignment).all()
+    assert cut_open(opened).told == opened.told
+    form = np.pad(opened.vertices_coords, ((0, 0), (0, 1)))
+    model = sheet_model(replace(opened, folded_coords=form))
+    assert set(opened.edges_assignment[model.creases_edges]) == {"V"}
     through = named_patterns.drawn(
         [
             *named_patterns.border((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)),

@@ -165,7 +165,8 @@ def sheet_model(
     unit = mean if unit_mm is None else unit_mm
     points = pattern.folded_coords / unit
     triangles, split = split_facets(points, pattern.faces_vertices)
-    inner = np.flatnonzero((pattern.edges_faces >= 0).all(axis=1))
+    joined = (pattern.edges_faces >= 0).all(axis=1) & (pattern.edges_assignment != "C")
+    inner = np.flatnonzero(joined)
     across = _hinges(triangles, pattern.edges_vertices[inner])
     flat = np.isin(pattern.edges_assignment[inner], UNCREASED)
     if flat.all():
