@@ -23,9 +23,9 @@ from miurafab.errors import JobStopped, MachineError, MiurafabError
 from miurafab.machine.keys import RESET
 from miurafab.machine.session_process import Message, SessionProcess
 from miurafab.machine.signals import StopSignals
-from miurafab.machine.sleeping import SLEPT_S, slept_s
+from miurafab.machine.sleeping import slept_s
 from miurafab.profiles import MachineProfile
-from miurafab.studio.machine_words import ENDED, FAILED, NO_ANSWER, OVER, VOID, slept
+from miurafab.studio.machine_words import ENDED, FAILED, NO_ANSWER, OVER, VOID
 from miurafab.workflow.at_machine import Operator
 from miurafab.workflow.cut_options import DEFAULT_OPTIONS
 
@@ -139,7 +139,7 @@ class HeldSession:
         how = why = FAILED
         operator: Operator | None = None
         try:
-            operator = Operator(self.process, None, DEFAULT_OPTIONS)
+            operator = Operator(self.process, None, DEFAULT_OPTIONS, self._asleep)
             self._follow(operator)
             why = self._why_over(operator)
         finally:
@@ -155,13 +155,8 @@ class HeldSession:
 
     def _follow(self, operator: Operator) -> None:
         look_at = 0.0
-        asleep = self._asleep()
         while not operator.over and not self._leaves.is_set():
             came = operator.take()
-            before, asleep, steady = asleep, self._asleep(), time.monotonic()
-            if asleep - before > SLEPT_S:
-                operator.said.append(slept(asleep - before, armed=operator.armed))
-                operator.armed = False
             came = self._carry_out(operator) or came
             while operator.failures:
                 self._failure = operator.failures.popleft()
@@ -169,8 +164,9 @@ class HeldSession:
                 operator.said.append(self.trouble)
             if self._failure is not None and not self._is_open(operator):
                 return
-            if came or steady >= look_at:
-                look_at = steady + _LOOK_S
+            now = time.monotonic()
+            if came or now >= look_at:
+                look_at = now + _LOOK_S
                 self._on_look(operator)
 
     def _is_open(self, operator: Operator) -> bool:

@@ -152,11 +152,6 @@ def _alarm_advice(alarm: int | None, homes: bool) -> str:
     )
 
 
-def slept(seconds: float, *, armed: bool) -> str:
-    """What is said after the computer slept, with a sheet that was ``armed`` before."""
-    return f"This computer slept for {seconds:.0f} s.{' Arm the sheet anew.' * armed}"
-
-
 _LABELS = {
     "home": "'Home'",
     "at": "'Set origin here'",

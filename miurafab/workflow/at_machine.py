@@ -8,6 +8,7 @@ steps, the second right after the first; and no sheet is started on material tha
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from miurafab.errors import InputError, MiurafabError, PersonNeeded
@@ -16,6 +17,7 @@ from miurafab.machine.known_controller import MachineState
 from miurafab.machine.planning import feeds_itself, put_in
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.session_process import Heard, Outcome, SessionProcess
+from miurafab.machine.sleeping import SLEPT_S, slept_s
 from miurafab.machine.transport import VIRTUAL
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
@@ -64,11 +66,16 @@ class Operator:
     """Orders to one session, and what came of them; mutable.
 
     ``busy`` is the action under way, empty for none. ``number`` is the sheet that is next, from 1.
-    ``said`` are lines for a person; ``failures`` what ended the actions that failed.
+    ``said`` are lines for a person; ``failures`` what ended the actions that failed. ``asleep``
+    tells how long the computer has slept.
     """
 
     def __init__(
-        self, process: SessionProcess, prepared: Prepared | None, options: CutOptions
+        self,
+        process: SessionProcess,
+        prepared: Prepared | None,
+        options: CutOptions,
+        asleep: Callable[[], float] = slept_s,
     ) -> None:
         self.prepared = prepared
         self.number = 1
@@ -80,6 +87,7 @@ class Operator:
         self._process, self._options = process, options
         self._timeline: Timeline | None = None
         self._has_origin = False
+        self._asleep, self._slept = asleep, asleep()
         self._burns: dict[int, Burn] = {}
         process.order("open", wait=options.send.wait, reset=options.send.reset)
 
@@ -125,6 +133,7 @@ class Operator:
         elif isinstance(message, Outcome):
             self._end(message)
         self._watch_origin()
+        self._watch_for_sleep()
         return message is not None
 
     def _watch_origin(self) -> None:
@@ -133,6 +142,14 @@ class Operator:
         if self._has_origin and not has_origin and self.busy != "set_origin":
             self.said.append("The origin that was set (G92) is forgotten; set it again.")
         self._has_origin = has_origin
+
+    def _watch_for_sleep(self) -> None:
+        """Disarm what was armed before the computer slept: the two steps belong together."""
+        before, self._slept = self._slept, self._asleep()
+        if self._slept - before > SLEPT_S:
+            tail = " Arm the sheet anew." if self.armed else ""
+            self.said.append(f"This computer slept for {self._slept - before:.0f} s.{tail}")
+            self.armed = False
 
     def _place(self, now: Progress) -> None:
         if self._timeline is not None:

@@ -54,6 +54,20 @@ def test_an_origin_that_is_moved_is_not_forgotten():
     assert list(operator.said) == []
 
 
+def test_a_sheet_that_was_armed_before_the_computer_slept_is_not_started(tmp_path):
+    """In a terminal as in the studio."""
+    job, slept = tmp_path / "line.nc", [0.0]
+    job.write_text("M4 S0\nG0 X5\nG1 X15 S500 F3000\nM5\n")
+    operator = Operator(Held(), prepare(job), CutOptions(), lambda: slept[0])
+    operator.busy = ""
+    for after, armed in ((0.9, True), (600.9, False)):
+        operator.arm()
+        slept[0] = after
+        operator.take()
+        assert operator.armed is armed
+    assert operator.said[-1] == "This computer slept for 600 s. Arm the sheet anew."
+
+
 @pytest.mark.parametrize(
     ("burnt", "what"),
     [
