@@ -5,7 +5,8 @@ its fold angle instead, so what has their four vertices is no pair. Diagonals of
 hardly bend, do not count as edges.
 
 Parallel edges have no one nearest point, so g is small there; the vertices of one are near facets
-of the other. Things that are near each other in the flat sheet already have a smaller h.
+of the other. Things that are near each other in the flat sheet already have a smaller h, and what
+touches there, as both sides of a cut do, is no pair: nothing could move.
 """
 
 from __future__ import annotations
@@ -47,7 +48,12 @@ class NearPairs:
 
     def at(self, points: Floats) -> TouchPairs:
         """The pairs at ``points`` (V, 3) that are within ``REACH``."""
-        return self._within(points, REACH)[1]
+        return self._found(points)[1]
+
+    def _found(self, points: Floats) -> tuple[Ints, TouchPairs]:
+        keys, pairs = self._within(points, REACH)
+        apart = pairs.height > LOWER * CLOSEST
+        return keys[apart], pairs.those(apart)
 
     def _within(self, points: Floats, reach: float) -> tuple[Ints, TouchPairs]:
         vertex, triangle = self._vertices_and_triangles(points, reach)
@@ -132,8 +138,7 @@ class NearPairs:
 
 class LastingPairs(NearPairs):
     """Pairs that keep the g at which they were found first, so that the energy of their springs is
-    one of the shape alone, on a long way too. What touches at ``rest``, as both sides of a cut do,
-    is no pair: nothing could move there.
+    one of the shape alone, on a long way too.
     """
 
     def __init__(self, triangles: Ints, edges: Ints, hinges: Ints, rest: Floats) -> None:
@@ -142,9 +147,7 @@ class LastingPairs(NearPairs):
 
     def at(self, points: Floats) -> TouchPairs:
         """The pairs at ``points`` (V, 3) that are within ``REACH``."""
-        keys, pairs = self._within(points, REACH)
-        apart = pairs.height > LOWER * CLOSEST
-        keys, pairs = keys[apart], pairs.those(apart)
+        keys, pairs = self._found(points)
         at, weight = places_among(self._known, keys), pairs.weight.copy()
         weight[at >= 0] = self._weights[at[at >= 0]]
         known = np.concatenate([self._known, keys[at < 0]])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import named_patterns
 import numpy as np
@@ -15,6 +16,7 @@ from miurafab.geometry.arrays import Floats
 from miurafab.geometry.dissection import Separator, dissect
 from miurafab.geometry.sparse import Factor, SymmetricSolver
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.cut_open import cut_open
 from miurafab.origami.energy.bar_hinge import BarHingeModel
 from miurafab.origami.energy.continuation import follow
 from miurafab.origami.energy.equilibrium import COARSEST, TOLERANCE, solve
@@ -349,6 +351,19 @@ def test_a_sheet_that_touches_nowhere_goes_its_way_at_the_same_cost(
     held = ramp_motion(pattern, 6, touching=True)[0]
     assert held.frames == pytest.approx(free.frames, abs=1e-9)
     assert without < len(made) <= 2 * without
+
+
+def test_the_two_sides_of_a_cut_do_not_hold_the_sheet() -> None:
+    """They lie on each other in the flat sheet, from where "it could not be followed to its first
+    position" with contact.
+    """
+    whole = named_patterns.kresling(8, 4, 120.0)
+    inner = np.flatnonzero((whole.edges_faces >= 0).all(axis=1))
+    letters = whole.edges_assignment.copy()
+    letters[inner[len(inner) // 3]] = "C"
+    sheet = cut_open(replace(whole, edges_assignment=letters))
+    assert piercings(sheet, 5, touching=False) > 0
+    assert piercings(sheet, 5, touching=True, error=8.0) == 0
 
 
 def test_contact_is_taken_up_where_it_is_needed() -> None:
