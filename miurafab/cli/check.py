@@ -28,7 +28,7 @@ def check(
         option(
             Flag(),
             "Also run the job in memory, fold and glue what the beam has cut, and say how far that "
-            "shell lies from the folded form.",
+            "shell lies from the folded form: farther than the material is thick does not hold.",
         ),
     ] = False,
     console: Console = Console(),
@@ -83,6 +83,11 @@ def _check_job(folder: Path, rebuild: bool, console: Console) -> int:
                 f"Folded and glued from the beam log alone, {again.measured} of {again.corners} "
                 f"corners lie at worst {again.worst_mm:.3f} mm from the folded form{to_target}."
             )
+            if not again.valid:
+                console.line(
+                    f"That is more than the material is thick ({again.thickness_mm:.3g} mm): what "
+                    "is burnt does not make this shell. Lay the pattern out anew."
+                )
 
     console.answer(answer, show)
-    return DONE if result.valid else NO
+    return DONE if result.valid and (again is None or again.valid) else NO

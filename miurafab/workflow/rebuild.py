@@ -55,6 +55,8 @@ class Rebuilt(Shown):
         without a target.
     folded_target_mm : float or None
         The same for the folded form.
+    thickness_mm : float
+        The thickness of the material.
     seconds : float
         The time that it took.
     """
@@ -64,11 +66,17 @@ class Rebuilt(Shown):
     worst_mm: float
     target_mm: float | None
     folded_target_mm: float | None
+    thickness_mm: float
     seconds: float
+
+    @property
+    def valid(self) -> bool:
+        """Whether no corner lies farther from its place than the material is thick."""
+        return self.worst_mm <= self.thickness_mm
 
     def report(self) -> dict[str, Any]:
         """The part of the JSON answer of ``check`` about it."""
-        return dict(self._facts())
+        return {"valid": self.valid, **self._facts()}
 
     def _summary(self) -> str:
         return f"{self.measured} of {self.corners} corners, within {self.worst_mm:.3g} mm"
@@ -114,7 +122,7 @@ def rebuild(directory: AnyPath) -> Rebuilt:
     pattern = read_fold(folder / pattern_name(folder, manifest))
     if pattern.folded_coords is None:
         raise PatternError(f"{folder}: the pattern has no folded form to compare with.")
-    kerf = job_material(layout.material, folder).kerf_mm
+    material = job_material(layout.material, folder)
     outlined, _, motion = patches_on_sheets(layout, pattern)
     names = (name for name, _ in written.passes)
     burnt = {name: _burnt(job, machine) for name, job in zip(names, written.jobs, strict=True)}
@@ -125,7 +133,7 @@ def rebuild(directory: AnyPath) -> Rebuilt:
             over = np.array([sheet.width_mm, 0.0, sheet.width_mm, 0.0])
             parts.append(over + burnt[sheet.back] * [-1, 1, -1, 1])
         sheets.append(np.concatenate(parts))
-    corners = recovered_corners(pattern, outlined, motion, kerf, sheets)
+    corners = recovered_corners(pattern, outlined, motion, material.kerf_mm, sheets)
     shell = glued_shell(pattern, outlined.face_patch, corners)
     known = np.zeros(len(shell), dtype=bool)
     known[corners.vertex[corners.fixed]] = True
@@ -138,7 +146,8 @@ def rebuild(directory: AnyPath) -> Rebuilt:
     made, meant = (_off_target(points, pattern) for points in (shell, pattern.folded_coords))
     used = np.unique(pattern.faces_vertices[pattern.faces_vertices >= 0])
     seconds = time.perf_counter() - started
-    return Rebuilt(len(used), int(known.sum()), float(away.max()), made, meant, seconds)
+    found, worst = int(known.sum()), float(away.max())
+    return Rebuilt(len(used), found, worst, made, meant, material.thickness_mm, seconds)
 
 
 def _off_target(points: Floats, pattern: CreasePattern) -> float | None:

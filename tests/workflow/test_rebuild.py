@@ -202,14 +202,30 @@ def test_distances_from_the_target_are_in_millimetres_of_the_shell(tmp_path):
     assert found.target_mm != found.folded_target_mm
     report = found.report()
     assert report == {
+        "valid": True,
         "corners": 25,
         "measured": 25,
         "worst_mm": found.worst_mm,
         "target_mm": found.target_mm,
         "folded_target_mm": found.folded_target_mm,
+        "thickness_mm": 0.3,
         "seconds": found.seconds,
     }
     assert 0 < found.seconds < 60
+
+
+def test_a_shell_that_is_off_by_more_than_the_material_is_thick_does_not_hold(
+    run, tmp_path, monkeypatch
+):
+    """Whatever the distance was, it was told with exit code 0."""
+    mf.sheets(regular(3, 3)).write(tmp_path / "job")
+    found = mf.rebuild(tmp_path / "job")
+    for off, code in ((found.thickness_mm, 0), (1.01 * found.thickness_mm, 1)):
+        moved = replace(found, worst_mm=off)
+        monkeypatch.setattr(mf, "rebuild", lambda folder, moved=moved: moved)
+        done = run("check", tmp_path / "job", "--rebuild")
+        assert done.returncode == code
+        assert ("more than the material is thick (0.3 mm)" in done.stdout) == bool(code)
 
 
 def test_a_shell_without_a_target_has_no_distance_from_one(tmp_path):
