@@ -140,8 +140,6 @@ class KnownController:
             self._opened = True
             self._learn_overrides()
             self.refresh()
-            if self._session.runs_at_start:
-                self._session.wait_status()  # a block may have lit the beam since
         else:
             self.refresh()
 
@@ -186,6 +184,8 @@ class KnownController:
             self._unknown.discard(question)  # not where the answer was lost
         if session.work_offset is None:  # a board that was not reset tells it late
             session.work_offset = self._offset_in_force()
+        if session.runs_at_start:
+            session.wait_status()  # a block or a macro may have lit the beam since
 
     def _offset_in_force(self) -> tuple[float, ...] | None:
         """What it adds to work coordinates now, by the last answers; None: it does not say."""
@@ -243,13 +243,12 @@ class KnownController:
         self._session.command("$X")
         if runs_unseen(self._dialect):
             self.may_differ()
-            self._session.command(MODES, HOMING_S)  # answered when that is over
             self._put_out()
             self.refresh()
 
     def home(self, heed: Callable[[], None] = lambda: None) -> None:
-        """See :meth:`Session.home`. The startup blocks that run behind it may change modes and
-        offsets; a beam that they light goes out at once.
+        """See :meth:`Session.home`. The startup blocks and macros that run behind it may change
+        modes and offsets; a beam that they light goes out at once.
         """
         try:
             self._session.home(heed)
@@ -258,6 +257,8 @@ class KnownController:
             self.may_differ()
 
     def _put_out(self) -> None:
+        if runs_unseen(self._dialect):
+            self._session.command(MODES, HOMING_S)  # answered when that is over
         if not self._session.wait_status().beam_off:
             self._session.command("M5")
 
@@ -343,7 +344,8 @@ class KnownController:
 
 def runs_unseen(dialect: str) -> bool:
     """Whether a controller of ``dialect`` may run what ``$N`` does not tell: FluidNC has macros
-    ``after_reset`` and ``after_unlock``, which run before any further line (``Protocol.cpp``).
+    ``after_reset``, ``after_homing`` and ``after_unlock``, which run behind the answer and before
+    any further line (``Protocol.cpp``, ``Homing.cpp``, ``ProcessSettings.cpp``).
     """
     return dialect == FLUIDNC
 

@@ -48,8 +48,8 @@ class MachineSession:
     """One conversation with one machine over ``transport``; mutable, for one thread.
 
     ``signals`` stop it; ``keys`` act at once in every wait. :meth:`open` greets the machine, as the
-    first action does by itself. ``owner`` is who holds the port (this process).
-    ``on_state`` is called with each new state; ``lines`` are what the controller says to a person.
+    first action does. ``owner`` is who holds the port (this process). ``on_state`` is called with
+    each new state; ``lines`` are what the controller says to a person.
     """
 
     def __init__(
@@ -113,10 +113,8 @@ class MachineSession:
         Never raises because of the machine.
         """
         self._signals.hold()
-        dark = self._stops = True
-        at_risk, self._at_risk = self._at_risk, False
-        if at_risk:
-            dark = self.conversation.stop()
+        at_risk, self._at_risk, self._stops = self._at_risk, False, True
+        dark = not at_risk or self.conversation.stop()
         self._transport.close()
         self._release()
         return dark
@@ -126,6 +124,7 @@ class MachineSession:
         self._note(self.conversation.wait_status())
         if not self.conversation.connection.in_flight:
             self.known.refresh()
+            self._at_risk |= self.state.beam_on  # what runs behind a line may have lit it since
         return self.state
 
     def watch(self, seconds: float) -> MachineState:

@@ -528,7 +528,7 @@ class Macros(FakeWire):
     unlocks, unanswered, dwell = False, 0, b"0.3"
 
     def write(self, data: bytes) -> None:
-        self.unlocks = self.unlocks or data == b"$X\n"
+        self.unlocks = self.unlocks or data in (b"$X\n", b"$H\n")
         super().write(data)
 
     def read(self, timeout: float) -> bytes:
@@ -542,23 +542,37 @@ class Macros(FakeWire):
         return said
 
 
-def with_macros() -> Macros:
-    machine = load_machine("fluidnc-laser-600")
-    return Macros(VirtualGrbl(virtual_settings(machine), baud=115_200, dialect="fluidnc"))
+def with_macros(homing: bool = False) -> Macros:
+    settings = virtual_settings(load_machine("fluidnc-laser-600")) | (HOMING if homing else {})
+    return Macros(VirtualGrbl(settings, baud=115_200, dialect="fluidnc"))
 
 
+@pytest.mark.parametrize("action", ["unlock", "home"])
 @pytest.mark.parametrize("dwell", [b"0.3", b"5"])
-def test_what_a_macro_of_fluidnc_lights_behind_an_unlocking_is_put_out(dwell: bytes) -> None:
+def test_what_a_macro_of_fluidnc_lights_behind_an_action_is_put_out(
+    dwell: bytes, action: str
+) -> None:
     """However long it takes; a reset, which runs the other macro, is not needed."""
-    wire = with_macros()
+    wire = with_macros(action == "home")
     session = MachineSession(wire, StopSignals(), PortSetup("fluidnc"))
     session.open()
     wire.dwell = dwell
-    assert session.unlock().beam_off
+    assert getattr(session, action)().beam_off
     assert session.close()
     wire.device.advance(9.0)
     assert not wire.device.beam_on
     assert b"\x18" not in wire.commands
+
+
+def test_what_a_macro_of_fluidnc_lights_behind_a_typed_line_is_put_out_at_the_close() -> None:
+    wire = with_macros()
+    session = MachineSession(wire, StopSignals(), PortSetup("fluidnc"))
+    session.command("M5")
+    session.say("$X")
+    assert session.state.beam_on
+    assert session.close()
+    wire.device.advance(9.0)
+    assert not wire.device.beam_on
 
 
 def test_a_signal_while_a_macro_runs_behind_an_unlocking_resets() -> None:
