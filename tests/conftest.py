@@ -11,7 +11,7 @@ import sys
 import pytest
 from command_line import Done
 from hypothesis import HealthCheck, settings
-from kept_fits import KeptFits
+from kept import KeptFits, KeptTimes
 from running_order import place
 
 from miurafab.__main__ import main
@@ -41,14 +41,19 @@ def pytest_runtest_protocol(item):
 
 
 @pytest.fixture(autouse=True, scope="session")
-def kept_fits(request, tmp_path_factory):
-    """Several workers keep their fits for each other; a process alone makes all anew."""
+def kept(request, tmp_path_factory):
+    """Several workers keep fits and estimates for each other; a process alone makes all anew."""
     if hasattr(request.config, "workerinput"):
-        from miurafab.origami.fitting import fit  # only here: it loads much
+        from miurafab.origami.fitting import fit  # only here: these load much
+        from miurafab.posting import make_job
+        from miurafab.workflow import dry_run, quicker
 
-        folder = tmp_path_factory.getbasetemp().parent / "fits"
+        folder = tmp_path_factory.getbasetemp().parent / "kept"
         folder.mkdir(exist_ok=True)
-        fit._fitted = KeptFits(folder, lambda: request.config.stash[RUNNING], fit._fitted)
+        stash = request.config.stash
+        fit._fitted = KeptFits(folder, lambda: stash[RUNNING], fit._fitted)
+        for module in (make_job, dry_run, quicker):
+            module.estimate = KeptTimes(folder, lambda: stash[RUNNING], module.estimate)
 
 
 def pytest_collection_modifyitems(items):
