@@ -147,7 +147,8 @@ class MachineSession:
                 return self.state
 
     def _note(self, report: StatusReport | None) -> None:
-        self._at_risk = report is None or report.beam_on or report.state not in _RESTING
+        rests = report is not None and report.state in _RESTING and not report.beam_on
+        self._at_risk = not rests or self._resting_beam.full
 
     # The keys
 

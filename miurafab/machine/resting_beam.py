@@ -97,6 +97,16 @@ class RestingBeam:
         """Something else was done: the line that was held back is a new one when it comes again."""
         self._held = ""
 
+    @property
+    def full(self) -> bool:
+        """Whether the armed beam is on at full power whatever S is: few reports tell that one."""
+        values = self._known.settings.values
+        return _only(values) is not None and _power(self._before(), values) > 0.0
+
+    def _before(self) -> Words:
+        modes = (*self._known.modes.modes, *self._since)
+        return [word for mode in modes for word in _words(mode)]
+
     def sure_of(self, line: str) -> str:
         """``line`` as it is to be sent. Raises :class:`~miurafab.errors.GcodeError` for one that
         would put the resting beam on, or its power up, unless it is the same as the last.
@@ -119,7 +129,7 @@ class RestingBeam:
         if state.modes:
             self._since.clear()  # else the controller does not tell them while it moves
         values = known.settings.values
-        before = [word for mode in (*known.modes.modes, *self._since) for word in _words(mode)]
+        before = self._before()
         burns = 0.0 if state.beam_off else _power(before, values)
         lit = _lit(read, before, known.modes.startup, values, checks=state.state == "Check")
         if lit.now <= burns and lit.later == 0.0:
@@ -174,9 +184,14 @@ def _lit(
 
 def _power(words: Iterable[tuple[str, float]], values: Mapping[int, float]) -> float:
     """:func:`resting_power` with the settings ``values``."""
+    laser_mode = bool(values.get(_LASER_MODE))
+    return resting_power(words, laser_mode=laser_mode, only=_only(values))
+
+
+def _only(values: Mapping[int, float]) -> float | None:
+    """The S that each S is with the settings ``values``, if there is no other."""
     least, most = values.get(_LEAST, 0.0), values.get(_MOST)
-    only = None if most is None or least < most else max(most, 1.0)
-    return resting_power(words, laser_mode=bool(values.get(_LASER_MODE)), only=only)
+    return None if most is None or least < most else max(most, 1.0)
 
 
 def _words(text: str) -> Words:

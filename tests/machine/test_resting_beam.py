@@ -314,6 +314,17 @@ def test_what_arms_is_held_back_where_each_s_is_full_power(range_: str, line: st
     assert not wire.device.beam_on
 
 
+def test_a_beam_at_full_power_that_few_reports_tell_is_put_out_at_the_close() -> None:
+    """GRBL tells what is armed in one report of ten, and S0 in each (``report.c``)."""
+    session, wire = here(laser_mode=True, _31=1000)
+    assert not is_sent(session, wire, "M4S0")
+    assert is_sent(session, wire, "M4S0")
+    session.watch(0.5)
+    assert wire.device.beam_on
+    assert session.close()
+    assert not wire.device.beam_on
+
+
 @pytest.mark.parametrize("range_", ["$31=1000", "$30=0", "$3/1.2=1000", "$30=0.5"])
 def test_what_makes_each_s_full_power_is_held_back_where_a_startup_block_would_burn(
     range_: str,
