@@ -315,8 +315,8 @@ def test_what_arms_is_held_back_where_each_s_is_full_power(range_: str, line: st
 
 
 def test_a_beam_at_full_power_that_few_reports_tell_is_put_out_at_the_close() -> None:
-    """GRBL tells what is armed in one report of ten, and S0 in each (``report.c``)."""
-    session, wire = here(laser_mode=True, _31=1000)
+    """GRBL tells what is armed in one report of ten, and with ``$30=0`` no S (``report.c``)."""
+    session, wire = here(laser_mode=True, _30=0)
     assert not is_sent(session, wire, "M4S0")
     assert is_sent(session, wire, "M4S0")
     session.watch(0.5)
