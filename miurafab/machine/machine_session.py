@@ -180,6 +180,7 @@ class MachineSession:
     def unlock(self) -> MachineState:
         """Unlock the controller after an alarm (``$X``); its position must still be right."""
         self.open()
+        self.conversation.require_ready("$X")  # else nothing was sent that is to be stopped
         self._or_stop(self.known.unlock)
         return self.look()
 
@@ -276,8 +277,7 @@ class MachineSession:
         Raises :class:`~miurafab.errors.GcodeError` for a line that cannot be sent or would burn at
         rest (:mod:`~miurafab.machine.resting_beam`), and what :meth:`command` raises.
         """
-        text = text.strip()
-        if text == "reset":
+        if (text := text.strip()) == "reset":
             self.abort()
         elif text in _REALTIME:
             with self.lines.everything():

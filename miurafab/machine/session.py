@@ -252,7 +252,7 @@ class Session:
         return self._exchange(text, ANSWER_S)[0]
 
     def _exchange(self, text: str, timeout: float) -> tuple[list[Event], Error | None]:
-        self._require_ready(text)
+        self.require_ready(text)
         self.write(self.connection.send_line(SendLine(0, text.encode("ascii"))))
         said: list[Event] = []
         end = self.now() + timeout
@@ -293,7 +293,8 @@ class Session:
         finally:
             self._check = check
 
-    def _require_ready(self, text: str) -> None:
+    def require_ready(self, text: str) -> None:
+        """Raise :class:`~miurafab.errors.ControllerError` where ``text`` cannot be sent now."""
         if self.connection.may_send(SendLine(0, text.encode("ascii"))):
             return
         if self.connection.state is State.LOCKED:

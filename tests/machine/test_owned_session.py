@@ -597,6 +597,21 @@ def test_a_lid_that_is_shut_again_is_the_only_one_that_new_material_resumes() ->
     assert session.state.state == "Idle"
 
 
+def test_an_unlocking_behind_a_hard_limit_says_at_once_that_a_reset_comes_first() -> None:
+    session, wire = here()
+    session.command("$22=1")
+    session.command("$21=1")
+    session.say("G1X50F600")
+    wire.device.press_limit("X")
+    wire.device.press_limit("X", False)
+    assert session.watch(0.5).state == "Alarm"
+    with pytest.raises(ControllerError, match="it is alarmed"):
+        assert sent_by(wire, session.unlock) == b""
+    assert wire.commands.count(b"\x18") == 0
+    session.abort()
+    assert session.unlock().idle
+
+
 def test_new_material_goes_on_with_no_program_that_the_lid_interrupted() -> None:
     session, wire = here()
     session.say("M4S500")
