@@ -325,14 +325,14 @@ def test_what_is_said_before_the_ok_is_the_answer_and_is_recorded(tmp_path: Path
     assert came.endswith(r"< [MSG:hello]\r\n")
 
 
-def test_homing_makes_a_position_known_again_and_asks_where_the_head_is() -> None:
+def test_homing_makes_a_position_known_again() -> None:
     session, wire = greeted(**{"$H": [b"ok\r\n"], "query": [DARK]})
     session.restarted_itself = True
     heeded: list[float] = []
     session.home(lambda: heeded.append(wire.time))
     assert session.restarted_itself is False
     assert heeded
-    assert wire.sent == [(wire.sent[0][0], b"$H\n"), (wire.sent[1][0], b"?")]
+    assert wire.commands == b"$H\n"
     session, wire = greeted(**{"$H": [b"ALARM:9\r\n"], "query": [DARK]})
     session.restarted_itself = True
     with pytest.raises(ControllerError, match="ALARM:9"):
