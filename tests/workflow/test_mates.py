@@ -28,7 +28,7 @@ def shells():
     ring = miurafab.fit("cylinder", facets=(4, 6), size=120, close="seam").pattern
     yield "cut", open_shell, {"max_patch": "150mmx150mm"}
     yield "ring", ring, {"max_patch": "150mmx150mm"}
-    yield "copies", open_shell, {"max_patch": "180mmx180mm", "quantity": 2}
+    yield "copies", open_shell, {"max_patch": "220mmx220mm", "quantity": 2}
 
 
 @pytest.fixture(scope="module")
