@@ -16,7 +16,7 @@ CASES = {
     "miura": (miura(12, 10), (70.0, 60.0)),
     "fan": (FAN, (130.0, 100.0)),
     "fan without grid": (without_grid(FAN), (130.0, 100.0)),
-    "triangles": (triangles(3, 11, 360.0), (160.0, 130.0)),
+    "triangles": (triangles(3, 8, 260.0), (130.0, 105.0)),
 }
 
 

@@ -240,7 +240,7 @@ def test_the_picture_of_a_pattern_shows_every_edge_once():
 
 
 def test_the_picture_of_a_layout_names_its_patches():
-    pattern = miura(30, 26)
+    pattern = miura(20, 18)
     layout = lay_out(pattern, bed(200.0, 150.0), card())
     root = ElementTree.fromstring(layout_svg(pattern, layout))
     names = [text.text for text in root.iter(SVG + "text")][:-3]
