@@ -80,7 +80,7 @@ def test_a_surface_with_parameters_names_its_job(run, tmp_path):
 
 
 def test_a_mesh_goes_the_whole_way(run, tmp_path):
-    saddle_mesh(15, 30.0).export(tmp_path / "saddle.stl")
+    saddle_mesh(8, 30.0).export(tmp_path / "saddle.stl")
     fitted = run("fit", "saddle.stl", "--facets", "4x4", "--size", "80mm", "-o", "saddle.fold")
     assert fitted.returncode == 0, fitted.stderr
     assert run("check", "saddle.fold").returncode == 0
