@@ -101,6 +101,11 @@ class Rig:
         seen = json.loads(self.page.get("machine"))
         return seen.get("state") == state and not seen["busy"]
 
+    def is_fresh(self) -> bool:
+        """Whether new material lies there, and nothing is under way."""
+        seen = json.loads(self.page.get("machine"))
+        return not seen["loaded"] and not seen["busy"]
+
     def run(self, abort: Callable[[], float]) -> tuple[float, float]:
         """The seconds from ``abort``, which says when it began, to the byte, and of these the
         seconds behind the studio's server; a job burns.
@@ -109,7 +114,7 @@ class Rig:
             self.ask("do", action="unlock")
             until(lambda: self.idle("Idle"))
         self.ask("do", action="fresh")
-        until(lambda: not json.loads(self.page.get("machine"))["loaded"])
+        until(self.is_fresh)
         self.ask("start", code=self.ask("arm")["armed"]["code"])
         until(lambda: self.bench.device.beam_on)
         time.sleep(0.3)
