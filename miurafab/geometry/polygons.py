@@ -7,7 +7,7 @@ than k corners. ``points`` are (V, 2) or (V, 3).
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -58,6 +58,26 @@ def touching_themselves(faces: Ints) -> Ints:
     ordered = np.sort(faces, axis=1)
     again = (ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)
     return np.flatnonzero(again.any(axis=1))
+
+
+def simple_loops(walk: Sequence[int]) -> list[list[int]]:
+    """The places of a closed ``walk`` from vertex to vertex, parted into loops that have no vertex
+    twice. Each begins at the vertex where it closes.
+
+    >>> simple_loops([7, 1, 2, 1, 3])
+    [[1, 2], [0, 3, 4]]
+    """
+    found, open_, place = list[list[int]](), list[int](), dict[int, int]()
+    for at, vertex in enumerate(walk):
+        if vertex in place:
+            begin = place[vertex]
+            found.append(open_[begin:])
+            for each in open_[begin:]:
+                del place[walk[each]]
+            del open_[begin:]
+        place[vertex] = len(open_)
+        open_.append(at)
+    return [*found, open_]
 
 
 def no_polygons(points: Floats, faces: Ints) -> Ints:

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from miurafab.geometry.arrays import Floats, Ints
-from miurafab.geometry.polygons import signed_areas
+from miurafab.geometry.polygons import signed_areas, simple_loops
 from miurafab.origami.crease_pattern import CreasePattern
 
 
@@ -66,31 +66,14 @@ def boundaries(pattern: CreasePattern, face_patch: Ints) -> list[Boundary]:
             while following[steps[-1]] != first:
                 steps.append(int(following[steps[-1]]))
             left[steps] = False
-            loops += [Boundary(tail[own], edge[own]) for own in _simple(tail, steps)]
+            for places in simple_loops(tail[steps].tolist()):
+                own = np.array(steps)[places]
+                own = np.roll(own, -int(np.argmin(own)))
+                loops.append(Boundary(tail[own], edge[own]))
         if len(loops) > 1:
             loops.sort(key=lambda loop: -_area(pattern, loop))
         found.append(Boundary(loops[0].vertices, loops[0].edges, tuple(loops[1:])))
     return found
-
-
-def _simple(tail: Ints, steps: list[int]) -> list[list[int]]:
-    """The closed walk along the sides ``steps`` from vertex to vertex (``tail``), parted into loops
-    that have no vertex twice, each from its lowest side on.
-    """
-    found = list[list[int]]()
-    open_, place = list[int](), dict[int, int]()
-    for step in steps:
-        vertex = int(tail[step])
-        if vertex in place:
-            loop = open_[place[vertex] :]
-            del open_[place[vertex] :]
-            for each in loop:
-                del place[int(tail[each])]
-            found.append(loop)
-        place[vertex] = len(open_)
-        open_.append(step)
-    found.append(open_)
-    return [loop[(low := loop.index(min(loop))) :] + loop[:low] for loop in found]
 
 
 def overlapping(pattern: CreasePattern, around: list[Boundary]) -> list[int]:

@@ -19,7 +19,7 @@ from miurafab.errors import PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.geometry.boxes import meeting_pairs
 from miurafab.geometry.connected import components
-from miurafab.geometry.polygons import filled, signed_areas, touching_themselves
+from miurafab.geometry.polygons import filled, signed_areas, simple_loops, touching_themselves
 
 _Start = tuple[int, Floats]
 """A vertex, and the direction of a flat line from there."""
@@ -93,14 +93,8 @@ def _hanging(points: Floats, face: Ints) -> Iterator[tuple[bool, _Start]]:
     """
     walk = face[face >= 0]
     walk = np.roll(walk, -int(np.argmin(points[walk, 0])))
-    loops, bases, open_ = list[list[int]](), set[int](), list[int]()
-    for vertex in [*walk.tolist(), int(walk[0])]:
-        if vertex in open_:
-            at = open_.index(vertex)
-            loops.append(open_[at:])
-            bases.add(vertex)
-            del open_[at:]
-        open_.append(vertex)
+    loops = [walk[places].tolist() for places in simple_loops(walk.tolist())]
+    bases = {base for base, *_ in loops}
     for base, *others in loops:
         corners = points[[base, *others]]
         if bases.intersection(others) or signed_areas(corners[None])[0] > 0:

@@ -118,41 +118,33 @@ def told_of_joining(near: float) -> Finding:
 
 def told_of_inner_parts(rounds: Sequence[InnerParts]) -> tuple[Finding, ...]:
     """What is told of the flat lines that make polygons of facets, in one round after another."""
-    loose, slits, hanging = (
+    found = (
         (
-            sum(counts)
-            for counts in zip(
-                *((each.loose, each.slits, each.hanging) for each in rounds), strict=True
-            )
-        )
-        if rounds
-        else (0, 0, 0)
+            sum(each.loose for each in rounds),
+            "part",
+            "of the drawing lie{} loose inside a facet: two flat lines (F) join {} to the lines "
+            "around.",
+        ),
+        (
+            sum(each.slits for each in rounds),
+            "end",
+            "of cuts lie{} inside a facet: a flat line (F) goes on from {} to the next line.",
+        ),
+        (
+            sum(each.hanging for each in rounds),
+            "part",
+            "of the drawing hang{} in a facet at one vertex: a flat line (F) joins {} to the lines "
+            "around.",
+        ),
     )
-    return tuple(_told_of_inner_parts(loose, slits, hanging))
-
-
-def _told_of_inner_parts(loose: int, slits: int, hanging: int) -> Iterator[Finding]:
-    if loose:
-        lies, them = ("lies", "it") if loose == 1 else ("lie", "each")
-        yield Finding(
+    return tuple(
+        Finding(
             "loose-parts",
-            f"{_many(loose, 'part')} of the drawing {lies} loose inside a facet: two flat lines "
-            f"(F) join {them} to the lines around.",
+            f"{_many(count, noun)} {says.format(*(('s', 'it') if count == 1 else ('', 'each')))}",
         )
-    if slits:
-        them = "it" if slits == 1 else "each"
-        yield Finding(
-            "loose-parts",
-            f"{_many(slits, 'end')} of cuts {'lies' if slits == 1 else 'lie'} inside a facet: a "
-            f"flat line (F) goes on from {them} to the next line.",
-        )
-    if hanging:
-        hangs, them = ("hangs", "it") if hanging == 1 else ("hang", "each")
-        yield Finding(
-            "loose-parts",
-            f"{_many(hanging, 'part')} of the drawing {hangs} in a facet at one vertex: a flat "
-            f"line (F) joins {them} to the lines around.",
-        )
+        for count, noun, says in found
+        if count
+    )
 
 
 def told_of_rulings(count: int) -> Finding:
