@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 
 SLEPT_S = 1.0
 """A shorter sleep is over before the controller has made what it holds."""
@@ -31,6 +32,18 @@ def slept_s() -> float:
         slept = _passed_s() - began
         if _awake_s() - began < _TORN_S:
             return slept
+
+
+class SleepWatch:
+    """Tells of each sleep once; ``asleep`` is as :func:`slept_s`."""
+
+    def __init__(self, asleep: Callable[[], float]) -> None:
+        self._asleep, self._slept = asleep, asleep()
+
+    def slept(self) -> float:
+        """The seconds of sleep since the last call; 0 for less than :data:`SLEPT_S`."""
+        before, self._slept = self._slept, self._asleep()
+        return self._slept - before if self._slept - before > SLEPT_S else 0.0
 
 
 if sys.platform == "win32":

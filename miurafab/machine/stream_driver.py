@@ -23,7 +23,7 @@ from miurafab.machine.known_controller import KnownController
 from miurafab.machine.planning import JobPlan
 from miurafab.machine.progress import AS_WRITTEN, JobAborted, Overrides, Progress, StreamResult
 from miurafab.machine.session import Session
-from miurafab.machine.sleeping import SLEPT_S, slept_s
+from miurafab.machine.sleeping import SleepWatch, slept_s
 from miurafab.machine.transcript import Transcript
 from miurafab.machine.transport import FlowTransport
 
@@ -72,7 +72,7 @@ class StreamDriver(ABC):
         self._records = [r for r in (context.transcript, context.journal) if r is not None]
         self._overrides = AS_WRITTEN
         self._overridden: set[Overrides] = set()
-        self._slept = slept_s()
+        self._sleep = SleepWatch(slept_s)
 
     # Defined by each dialect
 
@@ -161,9 +161,8 @@ class StreamDriver(ABC):
         self.obey()
 
     def _watch_for_sleep(self) -> None:
-        before, self._slept = self._slept, slept_s()
-        slept = self._slept - before
-        if slept > SLEPT_S and self._context.transport.blocks and not self.stands:
+        slept = self._sleep.slept()
+        if slept and self._context.transport.blocks and not self.stands:
             raise MachineError(
                 f"The computer slept for {slept:.0f} s while it sent {self.plan.job.name}, and "
                 "nobody may have watched the machine since"

@@ -17,7 +17,7 @@ from miurafab.machine.known_controller import MachineState
 from miurafab.machine.planning import feeds_itself, put_in
 from miurafab.machine.progress import Progress, StreamResult
 from miurafab.machine.session_process import Heard, Outcome, SessionProcess
-from miurafab.machine.sleeping import SLEPT_S, slept_s
+from miurafab.machine.sleeping import SleepWatch, slept_s
 from miurafab.machine.transport import VIRTUAL
 from miurafab.workflow.cut import Prepared
 from miurafab.workflow.cut_options import CutOptions
@@ -87,7 +87,7 @@ class Operator:
         self._process, self._options = process, options
         self._timeline: Timeline | None = None
         self._has_origin = False
-        self._asleep, self._slept = asleep, asleep()
+        self._sleep = SleepWatch(asleep)
         self._burns: dict[int, Burn] = {}
         process.order("open", wait=options.send.wait, reset=options.send.reset)
 
@@ -145,10 +145,9 @@ class Operator:
 
     def _watch_for_sleep(self) -> None:
         """Disarm what was armed before the computer slept: the two steps belong together."""
-        before, self._slept = self._slept, self._asleep()
-        if self._slept - before > SLEPT_S:
+        if slept := self._sleep.slept():
             tail = " Arm the sheet anew." if self.armed else ""
-            self.said.append(f"This computer slept for {self._slept - before:.0f} s.{tail}")
+            self.said.append(f"This computer slept for {slept:.0f} s.{tail}")
             self.armed = False
 
     def _place(self, now: Progress) -> None:

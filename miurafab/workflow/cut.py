@@ -69,10 +69,14 @@ class Prepared:
         """
         return (() if self.directory is None else self.directory.edits) + self.elsewhere
 
+    def written(self, number: int) -> Job:
+        """The job of sheet ``number`` as it was written, before it was turned."""
+        aligned = self.aligned
+        return aligned.written if aligned and aligned.number == number else self.jobs[number - 1]
+
     def sha256_of(self, number: int) -> str:
-        """The digest of the job of sheet ``number`` as it was written."""
-        job, aligned = self.jobs[number - 1], self.aligned
-        return (aligned.written if aligned and aligned.number == number else job).sha256
+        """The digest of that job."""
+        return self.written(number).sha256
 
     def back_of(self, number: int) -> str | None:
         """The digest of the job for the back of sheet ``number``; None for a back itself and a

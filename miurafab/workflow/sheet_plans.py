@@ -70,10 +70,7 @@ def _starts(
     starts: list[tuple[int, Resumption | None]] = []
     begun = False
     for number in prepared.chosen(sheets):
-        aligned = prepared.aligned
-        if aligned is not None and aligned.number != number:
-            aligned = None
-        written = prepared.jobs[number - 1] if aligned is None else aligned.written
+        aligned, written = prepared.aligned, prepared.written(number)
         resumption: Resumption | None = None
         if options.from_stroke is not None and not starts:
             resumption = from_stroke(written, prepared.machine, options.from_stroke)
@@ -85,7 +82,7 @@ def _starts(
                 continue
             if runs:
                 resumption = resume(written, prepared.machine, runs)
-        if resumption is not None and aligned is not None:
+        if resumption is not None and aligned is not None and aligned.number == number:
             resumption = aligned.rest(resumption, prepared.machine)
         starts.append((number, resumption))
     if options.resume and not (begun and starts):
