@@ -13,7 +13,7 @@ from miurafab.workflow.fold_options import FoldOptions
 from miurafab.workflow.patterns import PatternLike, movable_pattern
 
 if TYPE_CHECKING:
-    from miurafab.origami.folding.motion import Progress
+    from miurafab.origami.energy.continuation import Progress
     from miurafab.workflow.folding import Folding
 
 

@@ -22,6 +22,7 @@ from miurafab.geometry.arrays import Floats
 from miurafab.options import read_options
 from miurafab.options.documented import described
 from miurafab.origami.crease_pattern import CreasePattern
+from miurafab.origami.energy.continuation import Progress
 from miurafab.origami.folding.angles_csv import Contact, angles_csv, contacts
 from miurafab.origami.folding.certificate import RigidCertificate
 from miurafab.origami.folding.contact import triangulate
@@ -35,7 +36,7 @@ from miurafab.origami.folding.kinematics import (
 )
 from miurafab.origami.folding.layers import LayerOrder, layer_order
 from miurafab.origami.folding.layers_apart import CLOSED, layer_shifts, split_facets
-from miurafab.origami.folding.motion import FoundMotion, Progress, find_motion
+from miurafab.origami.folding.motion import FoundMotion, find_motion
 from miurafab.origami.folding.ramp_motion import RampVerdict
 from miurafab.origami.formats.fold import write_fold
 from miurafab.origami.formats.mesh import glb_bytes

@@ -158,3 +158,10 @@ def without_load(
         a = (a[0], a[1] / 2) if (load < 0) == (b[1] < 0) else b
         b = (drive, load)
     return best
+
+
+def named(on_progress: Progress | None, way: str) -> Progress | None:
+    """``on_progress`` of a further ``way``, whose steps are counted anew."""
+    if on_progress is None:
+        return None
+    return lambda part, text: on_progress(part, f"{way}, {text}")

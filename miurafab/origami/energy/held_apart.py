@@ -18,12 +18,20 @@ from functools import cached_property
 import numpy as np
 
 from miurafab.geometry.arrays import Floats, Ints
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.origami.energy.assembly import NO_TOUCH, Touch
 from miurafab.origami.energy.continuation import Walk
 from miurafab.origami.energy.equilibrium import EquilibriumState, Solution, solve
 from miurafab.origami.energy.hinges import hinge_angles
 from miurafab.origami.energy.ramp import nearing
-from miurafab.origami.energy.touch_pairs import ARMED, LEASH, LOWER, Contacts, LastingPairs
+from miurafab.origami.energy.touch_pairs import (
+    ARMED,
+    LEASH,
+    LOWER,
+    MOST_ARMINGS,
+    Contacts,
+    LastingPairs,
+)
 from miurafab.origami.energy.touching import (
     HEIGHT,
     free_way,
@@ -38,8 +46,6 @@ CLOSING = 0.05
 """Radians to half a turn from which a hinge is pushed back."""
 CLOSING_STIFFNESS = 1.0
 """k of that spring, for the length of its hinge: that of a facet."""
-MOST_ARMINGS = 5
-"""How often a state is solved anew with springs between what came to touch in it."""
 SHORTENINGS = 10
 """How often a step is halved that closes a hinge, or that goes too far at once."""
 
@@ -102,9 +108,8 @@ class TouchingDriven(YieldingDriven):
     def _closing(self) -> tuple[Floats, Floats]:
         """(H,) h and k of the springs between the two sides of hinges."""
         model = self.model
-        ends = model.points[model.hinges[:, :2]]
         gap = np.pi - np.abs(hinge_angles(model.points, model.hinges))
-        stiffness = CLOSING_STIFFNESS * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        stiffness = CLOSING_STIFFNESS * edge_lengths(model.points, model.hinges[:, :2])
         return np.minimum(CLOSING, LOWER * gap), stiffness
 
 

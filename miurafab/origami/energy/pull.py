@@ -21,7 +21,7 @@ from miurafab.errors import InputError, PatternError
 from miurafab.geometry.arrays import Bools, Floats, Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.energy.bar_hinge import Paper, sheet_model
-from miurafab.origami.energy.continuation import Progress, Walk
+from miurafab.origami.energy.continuation import Progress, Walk, named
 from miurafab.origami.energy.held_apart import TouchingDriven, TouchingWalk
 from miurafab.origami.energy.pull_cycles import PullCycles
 from miurafab.origami.energy.result import EnergyResult
@@ -261,13 +261,9 @@ def pull(
     apart = TouchingDriven(
         model, stencil, yields=yields, hardening=paper.hardening, edges=pattern.edges_vertices
     )
-    with_contact = None if on_progress is None else _with_contact(on_progress)
+    with_contact = named(on_progress, "with contact")
     held = PullCycles(apart, TouchingWalk(apart, apart.rest), strain, steps, cycles, with_contact)
     return replace(_walked(pattern, paper, pair, held), touching=True)
-
-
-def _with_contact(on_progress: Progress) -> Progress:
-    return lambda part, text: on_progress(part, f"with contact, {text}")
 
 
 def _piece_of(

@@ -27,6 +27,7 @@ import numpy as np
 from scipy import sparse
 
 from miurafab.geometry.arrays import Floats
+from miurafab.geometry.polygons import edge_lengths
 from miurafab.geometry.sparse import Factor
 from miurafab.origami.energy.assembly import NO_TOUCH, Touch
 from miurafab.origami.energy.bar_hinge import BarHingeModel
@@ -153,8 +154,7 @@ class Ramped(Balance):
 
     @cached_property
     def _stop(self) -> Floats:
-        ends = self.model.points[self.hinges[:, :2]]
-        return np.asarray(LIMIT_STIFFNESS * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+        return LIMIT_STIFFNESS * edge_lengths(self.model.points, self.hinges[:, :2])
 
 
 class Descent(NamedTuple):

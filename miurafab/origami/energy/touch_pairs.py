@@ -27,6 +27,8 @@ LOWER = 0.5
 """h is at most this part of the distance in the flat sheet."""
 ARMED = 0.1
 """Mean edges within which a pair has its spring from the beginning of a step."""
+MOST_ARMINGS = 5
+"""How often a state is solved anew with springs between what came to touch in it."""
 LEASH = REACH - HEIGHT
 """Mean edges by which two things may come nearer before it is looked anew which are near."""
 
@@ -185,7 +187,6 @@ class Contacts:
 
     def arm(self, points: Floats, within: float) -> None:
         """Give springs to the pairs that are nearer than ``within`` at ``points`` as well."""
-        self._armed = self._armed.copy()
         self._armed[self.pairs.nearer_than(within, points)[0]] = True
         self.sprung = self.pairs.those(self._armed)
 

@@ -15,10 +15,9 @@ certified whether all facets can stay flat (:mod:`miurafab.origami.folding.certi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from miurafab.geometry.arrays import Ints
 from miurafab.origami.crease_pattern import CreasePattern
 from miurafab.origami.cut_open import cut_open
 from miurafab.origami.energy.bar_hinge import SOFTNESS
+from miurafab.origami.energy.continuation import Progress, named
 from miurafab.origami.energy.ruled import is_ruled
 from miurafab.origami.folding.angles_csv import contacts
 from miurafab.origami.folding.bending import bending_motion
@@ -48,8 +48,6 @@ from miurafab.origami.folding.ramp_motion import (
     followed_once,
     ramp_motion,
 )
-
-Progress = Callable[[float, str], None]
 
 SOFTER = 10 * SOFTNESS
 """For a sheet that is held back: sides as soft as those of other simulators, which stretch by some
@@ -136,27 +134,33 @@ def _from_flat(
     again = steps <= most
     motion, verdict = _followed(pattern, steps, again, waiting, on_progress)
     if verdict.is_held_back and again:
-        progress = _named(on_progress, "softer paper")
+        progress = named(on_progress, "softer paper")
         soft, its_verdict = ramp_motion(
             pattern, steps, softness=SOFTER, waiting=waiting, on_progress=progress
         )
         if its_verdict.is_better_than(verdict):
             softness, motion, verdict = SOFTER, soft, its_verdict
-    with_contact = partial(
-        ramp_motion,
-        pattern,
-        steps,
-        touching=True,
-        waiting=waiting,
-        on_progress=_named(on_progress, "with contact"),
-    )
+
+    @cache
+    def with_contact(softness: float) -> tuple[FoldingMotion, RampVerdict] | None:
+        """None where it ends before its first frame."""
+        with suppress(PatternError):
+            return ramp_motion(
+                pattern,
+                steps,
+                touching=True,
+                softness=softness,
+                waiting=waiting,
+                on_progress=named(on_progress, "with contact"),
+            )
+        return None
+
     met = None
     if verdict.is_held_back and again and verdict.seed_signs == 1.0:
         # all folds begin as they shall, so that it is what they meet on the way that turns them
-        with suppress(PatternError):
-            met = with_contact()
-            if met[1].is_better_than(verdict):
-                motion, verdict = met
+        met = with_contact(SOFTNESS)
+        if met is not None and met[1].is_better_than(verdict):
+            motion, verdict = met
     # beside a curved crease facets bend, so that what flat ones could not do says nothing
     ruled = is_ruled(pattern)
     if not again and (verdict.is_held_back or contacts(motion)):
@@ -166,10 +170,9 @@ def _from_flat(
     if again and contacts(motion):
         # where it ends before its first frame, or the folds go astray, the contacts of the way
         # without it are told
-        with suppress(PatternError):
-            apart, its_verdict = met or with_contact(softness=softness)
-            if _waits(its_verdict, ruled) or its_verdict.wrong_signs <= MOST_WRONG:
-                motion, verdict = apart, its_verdict
+        met = met or with_contact(softness)
+        if met is not None and (_waits(met[1], ruled) or met[1].wrong_signs <= MOST_WRONG):
+            motion, verdict = met
         if _waits(verdict, ruled):  # without contact such folds pass through the sheet
             raise _sequence(verdict)
     rigid, certificate = certified(motion)
@@ -184,7 +187,7 @@ def _followed(
     """The motion from flat. Where it is lost it is gone ``again`` in finer steps: the number of
     frames that are asked for shall not decide whether a pattern folds.
     """
-    finely = _named(on_progress, "finer steps")
+    finely = named(on_progress, "finer steps")
     follow = partial(ramp_motion, pattern, steps, waiting=waiting)
     try:
         motion, verdict = follow(on_progress=on_progress)
@@ -195,13 +198,6 @@ def _followed(
     fine, its_verdict = follow(finer=FINER, on_progress=finely)
     farther = its_verdict.complete or len(fine.frames) > len(motion.frames)
     return (fine, its_verdict) if farther else (motion, verdict)
-
-
-def _named(on_progress: Progress | None, way: str) -> Progress | None:
-    """``on_progress`` of a further ``way``, whose steps are counted anew."""
-    if on_progress is None:
-        return None
-    return lambda part, text: on_progress(part, f"{way}, {text}")
 
 
 def _is_sequence(verdict: RampVerdict, ruled: bool) -> bool:

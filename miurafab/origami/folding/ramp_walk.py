@@ -38,15 +38,20 @@ from miurafab.origami.energy.ramp import (
     raised_diagonal,
     softest_moves,
 )
-from miurafab.origami.energy.touch_pairs import ARMED, LEASH, REACH, Contacts, NearPairs
+from miurafab.origami.energy.touch_pairs import (
+    ARMED,
+    LEASH,
+    MOST_ARMINGS,
+    REACH,
+    Contacts,
+    NearPairs,
+)
 from miurafab.origami.energy.touching import HEIGHT, free_way
 
 ENOUGH = 1e-6
 """The force, in k_f, at which a descent hands over to Newton's iteration."""
 ROUNDS = 200
 """The most steps of a descent."""
-MOST_ARMINGS = 5
-"""How often a step is solved anew with springs between what came to touch in it."""
 MOST_FACTORS = 4
 """How many factorisations Newton's iteration gets where facets may touch, before a descent."""
 MOST_PIECES, PIECE_ROUNDS = 80, 60
