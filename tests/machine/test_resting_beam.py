@@ -134,12 +134,18 @@ def test_startup_blocks_that_light_each_start_together_are_held_back(
 ) -> None:
     session, wire = here(laser_mode)
     assert all(is_sent(session, wire, line) for line in lines)
-    with pytest.raises(GcodeError, match=r" and the next reset .*S500.*M5, and again after each"):
-        session.say(last)
-    assert is_sent(session, wire, last)
+    says = r" and the next reset .*S500.*M5, and again after each"
+    assert_burns_from_the_next_start(session, wire, last, says, 2.0)
+
+
+def assert_burns_from_the_next_start(session, wire, line: str, says: str, seconds: float) -> None:
+    """``line`` is held back in the words ``says``, and lights the beam at the next start alone."""
+    with pytest.raises(GcodeError, match=says):
+        session.say(line)
+    assert is_sent(session, wire, line)
     assert not wire.device.beam_on
     wire.device.power_cycle()
-    wire.device.advance(2.0)
+    wire.device.advance(seconds)
     assert wire.device.beam_on
 
 
@@ -334,13 +340,8 @@ def test_what_makes_each_s_full_power_is_held_back_where_a_startup_block_would_b
     assert all(
         is_sent(session, wire, line) for line in ("$N0=M4", "$31=1", "$30=500", "$32=1", "$130=0")
     )
-    with pytest.raises(GcodeError, match=r"and the next reset .*\(\$32=1\).* again after each"):
-        session.say(range_)
-    assert is_sent(session, wire, range_)
-    assert not wire.device.beam_on
-    wire.device.power_cycle()
-    wire.device.advance(1.0)
-    assert wire.device.beam_on
+    says = r"and the next reset .*\(\$32=1\).* again after each"
+    assert_burns_from_the_next_start(session, wire, range_, says, 1.0)
 
 
 def test_what_leaves_each_s_full_power_is_sent() -> None:
